@@ -22,7 +22,7 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	@echo "making the environment in $(VENV) (about a minute) ..."
 	@$(PYTHON) -m venv $(VENV)
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
-	  --disable-pip-version-check --editable '.[ground,logs,map,serve,torch,dev]'
+	  --disable-pip-version-check --editable '.[ground,logs,map,serve,sklearn,torch,dev]'
 	@touch $@
 
 demo: $(VENV)/.ready ## the story of README: data, training, comparison, a gap, a better board; one picture
@@ -64,8 +64,7 @@ pages: $(VENV)/.ready ## write the blocks of pages that commands print; `tools/p
 models: $(VENV)/.ready ## train the released models again, into exported/
 	@$(BIN)/python exported/make.py
 
-limit: $(VENV)/.ready ## compute the Bayes limit of the benchmark and of the reference sets, ten minutes on two cores
-	@$(BIN)/soilml compare --limit training/benchmark/benchmark_limit.parquet
+limit: $(VENV)/.ready ## compute the exact posteriors of the reference sets, seven minutes on two cores
 	@$(BIN)/python bench/reference_sets.py
 
 kls1: $(VENV)/.ready ## evaluate the KLS-1 tests: make kls1 SOILML_DATA=/path/to/data
@@ -105,7 +104,7 @@ mutation: $(VENV)/.ready ## change the source at random places and see whether a
 	@$(BIN)/python tools/mutation.py --mutants $(or $(MUTANTS),12)
 
 # what the tests need beside the libraries that users install, and the tests that tell versions apart
-TEST_LIBRARIES := '.[ground,logs,map,cluster,serve,torch]' array-api-strict filelock hypothesis pytest pytest-xdist sympy
+TEST_LIBRARIES := '.[ground,logs,map,serve,torch]' array-api-strict filelock hypothesis pytest pytest-xdist sympy
 TEST_VERSIONS := -m pytest -q -n auto -p no:cacheprovider \
 	  -m "not slow and not network and not long and not browser" tests/soilml tests/training tests/datagen
 

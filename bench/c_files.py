@@ -1,4 +1,4 @@
-"""Exported C files: latency and answers beside onnxruntime, memory, stack and instructions."""
+"""Exported C files: latency beside onnxruntime, memory, stack and instructions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from c_call_graph import call_graph
 from compiled_c import COMPILERS, ROOT, CompiledModel, compile_library
 from emulated_board import MISSING, run_on_board
 from runner import Bench, Row, Sample, markdown, member, table
-from simulated_rows import ANY_WHEEL, context_of, rows_of
+from simulated_rows import ANY_WHEEL, rows_of
 
 from soilml import Estimator
 from soilml.cli import main
@@ -32,9 +32,7 @@ COMPARED, SMALL = ("wheel", "any_wheel"), ("wheel_small", "any_wheel_small")
 #: Files with a set posterior, and those of single readings.
 WITH_SETS = ("wheel", "any_wheel", "kls1_wheel", *SMALL)
 SINGLES = ("wheel_linear", "wheel_mlp", "wheel_lssvm", "slip_torque")
-CALLS, SETS, STREAMS = 600, 1000, 20
-QUICK_CALLS, QUICK_SETS, QUICK_STREAMS = 40, 40, 2
-NAMES = ("mean", "std", "low", "high")
+CALLS, QUICK_CALLS = 600, 40
 SINGLE = "one reading"
 #: Rows that the emulated board steps through, and the seed of their noise.
 ROWS, SEED = 60, 8
@@ -44,13 +42,6 @@ ABOUT_LATENCY = (
     "the memory. *Noise alone*: a case without errors of sensors and model, for which graph and C "
     "have a branch; *with errors*: those that the file has by itself. C is called through ctypes, "
     "which adds about one microsecond. Goal: half of the latency of onnxruntime."
-)
-ABOUT_ANSWERS = (
-    "Differences in standard deviations of the answer, largest of the three quantities. Cases are "
-    f"{SETS} sets of 1 to 32 rows with absent channels, and {STREAMS} streams of 300 rows in steps "
-    "of 1 to 32. Beside them those of onnxruntime from itself, with the rows of each step in "
-    "another order: rounding alone. *Flags*: sets whose `in_range` differs. Goal: differences as "
-    "small as those of rounding."
 )
 ABOUT_MEMORY = (
     "What generated C needs at most: bytes that the headers state, by the rows that a step takes; "
@@ -174,63 +165,6 @@ def latency_table(rows: list[Row]) -> str:
     return markdown(("file", "what", "onnxruntime", "p99", "C", "p99"), lines, 2)
 
 
-def answer_cases(sample: Sample) -> list[Row]:
-    """Sets and streams of files; none where there is no C compiler."""
-    counts = {"sets": SETS, "streams": STREAMS}
-    if sample.quick:
-        counts = {"sets": QUICK_SETS, "streams": QUICK_STREAMS}
-    return [
-        {"file": name, "rows": kind, "count": count}
-        for name in COMPARED
-        for kind, count in counts.items()
-        if COMPILERS
-    ]
-
-
-def answers(case: Row) -> list[Row]:
-    """Differences of C and of another order of rows from onnxruntime, and whether flags differ."""
-    rng, name = np.random.default_rng(11), case["file"]
-    plain, found = Estimator.load(ROOT / "exported" / f"{name}.onnx"), []
-    for _ in range(case["count"]):
-        length = int(rng.integers(1, 33)) if case["rows"] == "sets" else 300
-        context = context_of(rng) if name == "any_wheel" else {}
-        rows = rows_of(rng, length, context or None)
-        if not all(np.isfinite(rows[k]).all() for k in ("slip", "torque", "load")):
-            continue
-        estimator = plain.on(**context) if context else plain
-        own, first = compiled(name).start(**context), 0
-        memory = reordered = estimator.start()
-        while first < length:
-            # a set in one step, in a random order beside; a stream in many, each turned round
-            count = length if case["rows"] == "sets" else int(rng.integers(1, 33))
-            part = {k: v[first : first + count] for k, v in rows.items()}
-            order = rng.permutation(length) if case["rows"] == "sets" else slice(None, None, -1)
-            expected, memory = estimator.step(memory, **part)
-            turned = {k: v[order] for k, v in part.items()}
-            other, reordered = estimator.step(reordered, **turned)
-            _, answer = compiled(name).update(own, compiled(name).rows(**part))
-            first += count
-        by_order = {k: getattr(other, k) for k in NAMES}
-        off = [[np.max(np.abs(a[k] - getattr(expected, k)) / expected.std) for k in NAMES]
-               for a in (answer, by_order)]  # fmt: skip
-        found.append({"off": off, "flag": answer["in_range"] != bool(expected.in_range)})
-    return found
-
-
-def answer_table(rows: list[Row]) -> str:
-    """Quantiles of the differences."""
-    lines = []
-    for name, kind in dict.fromkeys((r["file"], r["rows"]) for r in rows):
-        own = [r for r in rows if (r["file"], r["rows"]) == (name, kind)]
-        off, flags = np.asarray([r["off"] for r in own]), sum(r["flag"] for r in own)
-        for what, columns in (("mean, std", slice(0, 2)), ("ends", slice(2, 4))):
-            most = off[:, :, columns].max(axis=2)
-            cells = [f"{np.quantile(side, q):.0e}" for side in most.T for q in (0.5, 0.99, 1.0)]
-            lines.append((name, kind, what, *cells[:3], flags, *cells[3:]))
-    head = ("file", "rows", "of", "median", "99 of 100", "largest", "flags")
-    return markdown((*head, "rounding: median", "99 of 100", "largest"), lines, 3)
-
-
 def memory_cases(sample: Sample) -> list[Row]:
     """Each file, the smallest alone for a quick look."""
     return [{"file": name} for name in (SMALL[:1] if sample.quick else (*WITH_SETS, *SINGLES))]
@@ -296,9 +230,6 @@ C_LATENCY = Bench(
     "c", "Exported C files: latency", ABOUT_LATENCY, latency_cases, latency, latency_table,
     timed=True,
 )  # fmt: skip
-C_ANSWERS = Bench(
-    "c-answers", "Exported C files: answers", ABOUT_ANSWERS, answer_cases, answers, answer_table
-)
 C_MEMORY = Bench(
     "c-memory", "Exported C files: memory and instructions", ABOUT_MEMORY, memory_cases, memory,
     memory_table,

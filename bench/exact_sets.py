@@ -13,7 +13,6 @@ from scipy.stats import qmc
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.resampling import systematic_resampling
 from soilml.onboard.set_contract import ABSENT_STD, RESPONSE_CHANNELS
-from training.benchmark.bayes_limit_file import FRACTIONS, HPD_DRAWS, PosteriorSummary
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
 from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 from training.set_posterior.monomials import monomial_terms, monomials
@@ -25,15 +24,31 @@ Floats = NDArray[np.float64]
 MIN_EFFECTIVE_SAMPLES = 400.0
 
 
+#: Quantiles of a posterior: ends of the 90 % and of the 50 % interval.
+FRACTIONS = (0.05, 0.25, 0.75, 0.95)
+HPD_DRAWS = 200  # Posterior draws that estimate the HPD level of the truth
+
+
 @dataclass(frozen=True)
-class RankedPosterior(PosteriorSummary):
-    """A `PosteriorSummary` with the statistics of simulation-based calibration.
+class ExactPosterior:
+    r"""The posterior of one set, with the statistics of simulation-based calibration.
+
+    `log_density` is the logarithm of the posterior density at the truth, and `hpd_level` the share
+    of the posterior with a higher density than the truth; both are of all unknowns jointly, as
+    fractions of their priors, nuisance parameters included.
+
+    .. math:: \log p(\theta^* | y) = \log p(y | \theta^*) - \log \int p(y | \theta) d\theta
 
     `rank` is the posterior probability (q,) of values below the truth: uniform over sets where the
     posterior is exact (Cook, Gelman and Rubin, J. Computational and Graphical Statistics 15, 2006).
-    `log_density` and `hpd_level` are of all unknowns jointly, nuisance parameters included.
     """
 
+    mean: Floats  # (q,)
+    covariance: Floats  # (q, q)
+    quantiles: Floats  # (4, q) at FRACTIONS
+    log_density: float
+    hpd_level: float
+    flagged: bool  # whether sampling or its surrogate failed
     rank: Floats
     effective_samples: float
     log_evidence: float
@@ -79,7 +94,7 @@ class Unknowns:
 
 def sample_posterior(
     unknowns: Unknowns, log_likelihood: Callable[[Floats], Floats], truth: Floats
-) -> tuple[RankedPosterior, ImportanceSample]:
+) -> tuple[ExactPosterior, ImportanceSample]:
     """The posterior under a log likelihood of coordinates (n, axes); `truth` are coordinates."""
     sample = importance_sample(lambda u: log_likelihood(unknowns.x(u)), unknowns.count)
     values = unknowns.values(unknowns.x(sample.u))
@@ -88,7 +103,7 @@ def sample_posterior(
     draws = unknowns.x(sample.u[systematic_resampling(sample.weights, HPD_DRAWS, 0.5)])
     log_density = log_likelihood(np.vstack([truth, draws]))
     true_values = unknowns.values(truth[None])
-    summary = RankedPosterior(
+    summary = ExactPosterior(
         mean=mean,
         covariance=(deviation.T * sample.weights) @ deviation,
         quantiles=sample.quantiles(values, np.asarray(FRACTIONS)),
@@ -113,7 +128,7 @@ TOLERANCE = 0.05
 BATCH = 4096
 
 
-def exact_set_posterior(family: WheelFamily, sets: SimulatedSets, index: int) -> RankedPosterior:
+def exact_set_posterior(family: WheelFamily, sets: SimulatedSets, index: int) -> ExactPosterior:
     r"""The posterior of one set, by the importance sampler of the analytic `posterior` method.
 
     The likelihood has the noise that the set was simulated with: proportional to the *true* value,
@@ -234,7 +249,7 @@ def _rms_error_over_noise(sets: SimulatedSets, index: int, y: Floats, true: Floa
 
 def posterior_of_memory(
     family: WheelFamily, system: Floats, sets: SimulatedSets, index: int
-) -> RankedPosterior:
+) -> ExactPosterior:
     r"""The posterior of a linear system (m, terms + errors), as in `SetPosterior`, well sampled.
 
     .. math:: \log p(y | x) = -\tfrac12 | S^{-1} A b(x) |^2 + const, \qquad I + G G^T = S S^T

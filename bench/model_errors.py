@@ -155,42 +155,6 @@ def tables(rows: list[Row]) -> str:
     return "\n\n".join(text)
 
 
-def price_cases(sample: Sample) -> list[Row]:
-    """Errors that a file may be told of, and those that it is told of by itself."""
-    file = Estimator.load(ROOT / "exported" / "wheel.onnx")
-    usual = dict(file.sets.common_errors) if file.sets else {}
-    sensors = {name: std for name, std in usual.items() if name != MODEL_ERROR_INPUT}
-    told = {f"{name} {std:g}": EXACT | {name: std} for name, std in sensors.items() if std}
-    told |= {"all errors of sensors": usual | {MODEL_ERROR_INPUT: 0.0}}
-    for size in (0.5, 1.0):
-        told[f"and model_error {size:g}"] = usual | {MODEL_ERROR_INPUT: size}
-    told["and errors of the model whose size is inferred"] = usual
-    sets = QUICK_SETS if sample.quick else SETS
-    own = {"world": WORLDS[0].name, "sets": sets, "seed": SEED}
-    return [own | {"wrong": n, "told": t, "channels": c} for n, t in told.items() for c in CHANNELS]
-
-
-def price(case: Row) -> Row:
-    """Width of the intervals of sound sets over that with exact sensors."""
-    file = Estimator.load(ROOT / "exported" / "wheel.onnx")
-    width, known = (
-        scored(*answers(file.on(**told), case, declared=False))["width"].mean(axis=0)
-        for told in (case["told"], EXACT)
-    )
-    return {"ratio": width / known}
-
-
-def price_table(rows: list[Row]) -> str:
-    """A line for each error."""
-    columns = {
-        f"{name}: c, phi, K": lambda own, name=name: each("ratio")(
-            [r for r in own if r["channels"] == name]
-        )
-        for name in CHANNELS
-    }
-    return table(rows, {"what may be wrong": "wrong"}, columns)
-
-
 def identify_cases(sample: Sample) -> list[Row]:
     """Each world with each set of channels."""
     sets, worlds = (2, WORLDS[:2]) if sample.quick else (IDENTIFIED_SETS, (*WORLDS, *LAW_WORLDS))
@@ -268,14 +232,6 @@ def notes(rows: list[Row]) -> list[str]:
 
 MODEL_ERRORS = Bench(
     "model-errors", "Wrong sensors and wrong models", ABOUT, cases, one_world, tables
-)
-PRICE = Bench(
-    "price-of-errors",
-    "Width of sound sets with typical errors, over that with exact sensors",
-    f"`wheel.onnx` on {SETS} sound sets of {ROWS} rows, told that something may be wrong.",
-    price_cases,
-    price,
-    price_table,
 )
 IDENTIFY_ERRORS = Bench(
     "identify-errors",

@@ -23,7 +23,7 @@ from datagen.recipe import read_recipe
 from soilml import Estimator, Model, Operating
 from soilml.quantities import SHEAR, Z_90
 from training.dataset import Dataset, read_dataset
-from training.regressors.standardisation import Standardisation
+from training.regressors.gaussian_regressor import Standardisation
 from training.spec import read_spec
 from training.train import train
 

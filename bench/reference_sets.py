@@ -9,18 +9,18 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from exact_sets import exact_set_posterior
+from exact_sets import ExactPosterior, exact_set_posterior
 
 from datagen.recipe import read_recipe
 from soilml.cli.progress import progress_bar
+from soilml.errors import InputError
 from soilml.onboard.set_contract import ABSENT_STD
 from soilml.physics.gears import Wheel
 from soilml.processes import process_map
 from soilml.quantities import SHEAR
-from training.benchmark.bayes_limit_file import PosteriorSummary, save_limit
-from training.benchmark.designs import HASHED_DIGITS
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 from training.spec import read_any_wheel_spec
@@ -31,6 +31,11 @@ COUNT = 170
 SEED = 4711
 #: Candidates simulated for each set that is used: some lie outside the range of the file.
 CANDIDATES = 3
+#: Significant digits that enter the hash of a set: two machines agree to more than these.
+HASHED_DIGITS = 5
+#: The exact posteriors of the reference sets, and what of them is stored.
+STORED = Path(__file__).with_name("sets_limit.npz")
+FIGURES = ("mean", "covariance", "quantiles", "log_density", "hpd_level", "flagged")
 #: Labels of the two families; they are part of the stored design keys.
 ONE_WHEEL, ANY_WHEEL = "reference wheel", "any wheel"
 
@@ -43,8 +48,6 @@ class ReferenceSet:
     number: int
     family: WheelFamily
     sets: SimulatedSets
-    effect: str = ""
-    names: tuple[str, ...] = SHEAR
 
     @property
     def rows(self) -> int:
@@ -97,9 +100,19 @@ def _in_range(family: WheelFamily, context: Mapping[str, float]) -> bool:
     return all(ends[name][0] <= value <= ends[name][1] for name, value in context.items())
 
 
-def packaged_posteriors() -> Path:
-    """The file with the exact posteriors of the reference sets."""
-    return Path(__file__).with_name("sets_limit.parquet")
+def stored_posteriors(references: Sequence[ReferenceSet]) -> dict[str, np.ndarray[Any, Any]]:
+    """`FIGURES` of the exact posteriors of these sets, in their order.
+
+    Raises `InputError` where the file has none of a set, or one of other rows.
+    """
+    with np.load(STORED) as file:
+        stored = {name: file[name] for name in file.files}
+    keys = zip(*(stored[name].tolist() for name in ("design", "number", "hash")), strict=True)
+    index = {key: i for i, key in enumerate(keys)}
+    rows = [index.get((one.design, one.number, one.hash)) for one in references]
+    if None in rows:
+        raise InputError(f"{STORED} is of other sets; compute it again: make limit")
+    return {name: np.asarray(stored[name][rows], float) for name in FIGURES}
 
 
 def as_any_wheel_sets(references: Sequence[ReferenceSet]) -> list[ReferenceSet]:
@@ -151,7 +164,7 @@ def with_noise_of_reading(references: Sequence[ReferenceSet]) -> list[ReferenceS
     return converted
 
 
-def _exact(reference: ReferenceSet) -> PosteriorSummary:
+def _exact(reference: ReferenceSet) -> ExactPosterior:
     return exact_set_posterior(reference.family, reference.sets, 0)
 
 
@@ -166,9 +179,11 @@ def store_posteriors() -> None:
         for summary in found:
             summaries.append(summary)
             done(len(summaries))
-    save_limit(packaged_posteriors(), references, summaries)
+    keys = {key: [getattr(r, key) for r in references] for key in ("design", "number", "hash")}
+    figures = {n: np.asarray([getattr(s, n) for s in summaries], np.float32) for n in FIGURES}
+    np.savez_compressed(STORED, **keys, **figures)
     flagged = sum(summary.flagged for summary in summaries)
-    print(f"written: {packaged_posteriors()}, {len(summaries)} sets, {flagged} flagged")
+    print(f"written: {STORED}, {len(summaries)} sets, {flagged} flagged")
 
 
 if __name__ == "__main__":

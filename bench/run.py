@@ -22,15 +22,10 @@ MODULES = (
     "board",
     "c_files",
     "pull_bands",
-    "climbing",
-    "advice",
-    "promises",
-    "wheel_leg_slip",
     "adapt",
     "gap_bench",
     "gap_pull",
     "gap_speed",
-    "challenge",
 )
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Learned estimators beside the Bayes limit, and how long training takes."""
+"""How long training takes."""
 
 from __future__ import annotations
 
@@ -7,47 +7,22 @@ import tempfile
 import time
 from pathlib import Path
 
-from board import estimator_of
-from runner import Bench, Row, Sample, each, one_case, table
+from runner import Bench, Row, Sample, each, table
 
 from datagen.generate import generate
 from datagen.recipe import read_recipe
-from training.benchmark.acceptance import goals
-from training.benchmark.report import LEGEND, benchmark_tables, goals_table
-from training.benchmark.suite import benchmark
 from training.dataset import read_dataset
 from training.spec import read_any_wheel_spec, read_spec
 from training.train import train, train_any_wheel
 
-FILES = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel")
 #: Rows of the data of the recipe `wheel`, whose own number is the first; rows of a quick look.
 ROWS, QUICK_ROWS = (96_000, 192_000, 400_000), 4_000
-WIDE = 400  # Characters of a line of the tables, which have all columns
-ABOUT_COMPARISON = (
-    "Written by `soilml compare`. The reference wheel follows the recipe `benchmark`: c 0 to 3 "
-    "kPa, phi 25 to 45 deg, K 5 to 30 mm, slip 0.05 to 0.6, load 30 to 120 N. Torque noise is 2 %, "
-    "and the bearing parameters are known. A single reading does not determine three parameters: "
-    "all methods stay near the prior there, with correspondingly wide intervals."
-)
 ABOUT_TIME = (
     "`soilml train fused` on rows of the recipe `wheel`, and `soilml train any_wheel`. Goals: 30 s "
     "for the 96 000 rows of the demonstration, 120 s for `any_wheel`, and cost that grows linearly "
     "with the number of rows. *Processor time* is that of all processes; where other programs "
     "run, wall time is longer."
 )
-
-
-def comparison(case: Row) -> Row:
-    """Released models and analytic methods on the fixed benchmark, with acceptance goals."""
-    results = benchmark({name: estimator_of(name) for name in FILES})
-    tables = [goals_table(goals(results)), *benchmark_tables(results)]
-    return {"text": "\n\n".join(f"{one.title}\n\n{one.text(WIDE)}" for one in tables)}
-
-
-def comparison_table(rows: list[Row]) -> str:
-    """As the command writes it."""
-    legend = " ".join(f"`{term}`: {meaning}" for term, meaning in LEGEND)
-    return f"{legend}\n\n```\n{rows[0]['text']}\n```"
 
 
 def time_cases(sample: Sample) -> list[Row]:
@@ -78,14 +53,6 @@ def time_table(rows: list[Row]) -> str:
     return table(rows, {"training": "name"}, columns)
 
 
-COMPARISON = Bench(
-    "comparison",
-    "Estimators and analytic methods relative to the Bayes limit",
-    ABOUT_COMPARISON,
-    one_case,
-    comparison,
-    comparison_table,
-)
 TRAINING = Bench(
     "training", "Time of training", ABOUT_TIME, time_cases, training_time, time_table, timed=True
 )

@@ -1,13 +1,13 @@
 """Catalogue of sensors that only one kind of gear has, by the table of the recipe that adds them.
 
-A new sensor is a class with the members of `GearSensor` and a line in `GEAR_SENSORS`.
+A new sensor is a class with the members of `StickSlip` and a line in `GEAR_SENSORS`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -29,36 +29,6 @@ LAWS = ("spring", "line")
 MIN_SLOPE = 0.02  # s^2/m; with a smaller slope of the line, vibration (its inverse) diverges
 
 
-class GearSensor(Protocol):
-    """A sensor whose reading depends on more than the forces, and further columns that explain it.
-
-    `sensor` is the column of its reading; `units` has the unit of each further column that is not
-    a quantity of `soilml.quantities`; `run_draws` is how many random numbers a run needs; slips
-    below `lowest_slip` have no reading.
-    """
-
-    sensor: ClassVar[str]
-    units: ClassVar[Mapping[str, str]]
-    run_draws: ClassVar[int]
-    lowest_slip: ClassVar[float]
-
-    @classmethod
-    def take(cls, settings: Settings, case: Case) -> Self:
-        """Read the table of the recipe; raises `InputError` naming the key, or the wrong gear."""
-        ...
-
-    def simulate(
-        self, case: Case, slip: Floats, load: Floats, lowest_load: float, u: Floats
-    ) -> tuple[Floats, dict[str, Floats]]:
-        """Noise-free readings (n,) and the further columns, each (n,).
-
-        `case` has the soil of each row. `u` (n, run_draws) are uniform between 0 and 1, the same in
-        all rows of a run. No load of the recipe is below `lowest_load` (N): whatever is derived
-        from it does not depend on the pieces in which rows are simulated.
-        """
-        ...
-
-
 @dataclass(frozen=True)
 class StickSlip:
     """The recipe's [stick_slip]: a law, and for the spring a leg and its unknown parameters.
@@ -67,13 +37,14 @@ class StickSlip:
     slides; both have one value in each run. None with the law `line`, where both follow the soil.
     """
 
-    sensor: ClassVar[str] = "vibration_m_s2"
+    sensor: ClassVar[str] = "vibration_m_s2"  # column of its reading
+    #: Units of further columns that are no quantity of `soilml.quantities`.
     units: ClassVar[Mapping[str, str]] = {
         "stick-slip.stiffness": "N/m",
         "stick-slip.increment": "rad",
     }
-    run_draws: ClassVar[int] = 2
-    lowest_slip: ClassVar[float] = 0.0
+    run_draws: ClassVar[int] = 2  # random numbers that a run needs
+    lowest_slip: ClassVar[float] = 0.0  # below it there is no reading
 
     law: str
     leg: SpringLeg
@@ -93,7 +64,12 @@ class StickSlip:
     def simulate(
         self, case: Case, slip: Floats, load: Floats, lowest_load: float, u: Floats
     ) -> tuple[Floats, dict[str, Floats]]:
-        """Vibration (m/s^2) and the columns of the parameters that it depends on, (n,)."""
+        """Vibration (m/s^2) and the columns of the parameters that it depends on, (n,).
+
+        `case` has the soil of each row. `u` (n, run_draws) are uniform between 0 and 1, the same in
+        all rows of a run. No load of the recipe is below `lowest_load` (N): what is derived from it
+        does not depend on the pieces in which rows are simulated.
+        """
         width = case.parameters()["gear.width"][1]
         leg = self.leg_parameters(case.soil, width, u)
         vibration = self.vibration(case.soil, slip, load, leg, lowest_load)
@@ -180,4 +156,4 @@ def _take_stick_slip(settings: Settings) -> StickSlip:
 
 
 #: Table of a recipe -> the sensor that it adds. Random streams follow this order: append only.
-GEAR_SENSORS: dict[str, type[GearSensor]] = {"stick_slip": StickSlip}
+GEAR_SENSORS: dict[str, type[StickSlip]] = {"stick_slip": StickSlip}

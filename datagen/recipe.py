@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from datagen.gear_sensors import GEAR_SENSORS, GearSensor
+from datagen.gear_sensors import GEAR_SENSORS, StickSlip
 from datagen.worlds import Worlds, take_worlds
 from soilml.config.case import Case, take_case
 from soilml.config.measurement_noise import Noise, take_noise
@@ -73,7 +73,7 @@ class Recipe:
     slip: Prior
     load: Prior
     covariates: dict[str, Prior]
-    gear_sensors: dict[str, GearSensor]
+    gear_sensors: dict[str, StickSlip]
     bias: dict[str, Noise]
     blocks: tuple[Block, ...]
     rows: int
@@ -199,7 +199,7 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
             if field not in covariates:
                 operating.fail(f"{COVARIATES[field]} is missing; the effect {effect.name} needs it")
     operating.finish()
-    gear_sensors: dict[str, GearSensor] = {}
+    gear_sensors: dict[str, StickSlip] = {}
     for table, kind in GEAR_SENSORS.items():
         if table in settings:
             gear_sensors[table] = kind.take(settings.table(table), case)

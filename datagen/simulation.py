@@ -16,13 +16,13 @@ from scipy.stats import qmc
 from datagen.gear_sensors import GEAR_SENSORS
 from datagen.random_streams import normal_by_index
 from datagen.recipe import OPERATING_COLUMNS, SENSOR_COLUMNS, Block, Recipe
+from datagen.worlds import process_functions, smooth_error
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
 from soilml.numerics.smooth_functions import SmoothFunctions
-from soilml.numerics.smooth_process import process_columns, slip_load_points
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.quantities import CHANNELS, COLUMNS, QUANTITIES, column
@@ -112,7 +112,7 @@ def _simulate(recipe: Recipe, piece: Piece) -> tuple[np.ndarray, dict[str, np.nd
     rows = sample_rows(recipe, block, piece.first, piece.last)
     case = recipe.case.with_values(rows.soil)
     at = Operating(slip=rows.slip, load=rows.load, **rows.covariates)
-    errors = [model_error(recipe, block, rows)]
+    errors = [model_error(recipe, block, at, rows.run)]
     if recipe.worlds is None:
         force = forces_of_one_gear(case, at)
     else:
@@ -135,29 +135,14 @@ def _simulate(recipe: Recipe, piece: Piece) -> tuple[np.ndarray, dict[str, np.nd
     return rows.run, columns, force.status
 
 
-def model_error(recipe: Recipe, block: int, rows: SampledRows) -> dict[str, Floats]:
-    r"""The error about its mean (n,) of each column with a [remainder] or from an emulator.
+def model_error(
+    recipe: Recipe, block: int, at: Operating, run: NDArray[np.int64]
+) -> dict[str, Floats]:
+    """The error about its mean (n,) of each column with a [remainder] or from an emulator.
 
-    .. math:: \delta_r(s, W) = \sum_j w_{rj} \phi_j(s, \ln W), \quad w_{rj} \sim N(0, 1)
-
-    All rows of a run r share the weights: the error is a smooth function of slip and load that
-    differs between runs, and no noise. Its variance is that of a model whose soil is fitted anew,
-    as the soil of a run is one of the prior.
-
-    References: Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2.
+    Its variance is that of a model whose soil is fitted anew, as the soil of a run is one of the
+    prior; see `smooth_error`.
     """
-    errors = dict[str, Floats]()
-    first, last = int(rows.run[0]), int(rows.run[-1]) + 1
-    for name, functions in _error_functions(recipe).items():
-        index = np.arange(first * functions.count, last * functions.count)
-        seed = recipe.seed, block, SENSOR_COLUMNS.index(column(name)), 3
-        weights = normal_by_index(seed, index).reshape(-1, functions.count)[rows.run - first]
-        errors[column(name)] = (functions.at(rows.slip, rows.load) * weights).sum(axis=1)
-    return errors
-
-
-def _error_functions(recipe: Recipe) -> dict[str, SmoothFunctions]:
-    """Functions of slip and load whose weighted sum is the error of a channel, by its name."""
     parts: dict[str, list[SmoothFunctions]] = {}
     if (remainder := recipe.case.remainder) is not None:
         for name in filter(remainder.of, CHANNELS):
@@ -165,21 +150,13 @@ def _error_functions(recipe: Recipe) -> dict[str, SmoothFunctions]:
     if (simulator := recipe.case.simulator) is not None:
         for name in CHANNELS:
             if std := simulator.error.get(column(name)):
-                error = Discrepancy(constant=std)
-                parts.setdefault(name, []).append(_process_functions(error, *recipe.driven))
-    return {name: SmoothFunctions.joined(own) for name, own in parts.items()}
-
-
-def _process_functions(
-    error: Discrepancy, slip: tuple[float, float], load: tuple[float, float]
-) -> SmoothFunctions:
-    """The absolute part of a discrepancy as functions of slip and load (N)."""
-    lengths = error.slip_length, error.log_load_length
-
-    def columns(slip: Floats, load: Floats) -> Floats:
-        return process_columns(slip_load_points(slip, load, *lengths), error.constant)
-
-    return SmoothFunctions.of(columns, lengths, slip, load)
+                functions = process_functions(Discrepancy(constant=std), recipe.driven)
+                parts.setdefault(name, []).append(functions)
+    errors = {}
+    for name, own in parts.items():
+        seed = recipe.seed, block, SENSOR_COLUMNS.index(column(name)), 3
+        errors[column(name)] = smooth_error(SmoothFunctions.joined(own), seed, at, run)
+    return errors
 
 
 def _add_gear_sensors(

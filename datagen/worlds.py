@@ -48,13 +48,13 @@ class Worlds:
     effects: The effects, by name.
     error: Share of runs with a smooth error in each channel: a Gaussian process of slip and log
         load (Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2).
-    amplitudes: Standard deviation of that process by column, in its unit, with its lengths.
+    amplitudes: That process by column: its standard deviation as `constant`, and its lengths.
     """
 
     effect: float
     effects: Mapping[str, type[Effect]]
     error: float
-    amplitudes: Mapping[str, tuple[float, Discrepancy]]
+    amplitudes: Mapping[str, Discrepancy]
 
     def forces(
         self, case: Case, at: Operating, seed: tuple[int, ...], run: NDArray[np.int64]
@@ -91,16 +91,41 @@ class Worlds:
         run: NDArray[np.int64],
     ) -> dict[str, Floats]:
         """The smooth error (n,) of each column; zero in runs that have none."""
-        slip, load = np.asarray(at.slip), np.asarray(at.load)
         present = uniform_by_index((*seed, HAS_ERROR), run) < self.error
         found = {}
-        for i, (name, (amplitude, kind)) in enumerate(self.amplitudes.items()):
-            functions = _process(kind, driven)
-            index = np.arange(int(run[0]) * functions.count, (int(run[-1]) + 1) * functions.count)
-            weights = normal_by_index((*seed, i, WEIGHTS), index).reshape(-1, functions.count)
-            value = (functions.at(slip, load) * weights[run - run[0]]).sum(axis=1)
-            found[name] = amplitude * present * value
+        for i, (name, kind) in enumerate(self.amplitudes.items()):
+            error = smooth_error(process_functions(kind, driven), (*seed, i, WEIGHTS), at, run)
+            found[name] = present * error
         return found
+
+
+def process_functions(
+    kind: Discrepancy, driven: tuple[tuple[float, float], tuple[float, float]]
+) -> SmoothFunctions:
+    """The absolute part of a discrepancy as functions of slip and load (N) in these ranges."""
+    lengths = kind.slip_length, kind.log_load_length
+
+    def columns(slip: Floats, load: Floats) -> Floats:
+        return process_columns(slip_load_points(slip, load, *lengths), kind.constant)
+
+    return SmoothFunctions.of(columns, lengths, *driven)
+
+
+def smooth_error(
+    functions: SmoothFunctions, seed: tuple[int, ...], at: Operating, run: NDArray[np.int64]
+) -> Floats:
+    r"""An error (n,) that is a smooth function of slip and load, one draw for each run.
+
+    .. math:: \delta_r(s, W) = \sum_j w_{rj} \phi_j(s, \ln W), \quad w_{rj} \sim N(0, 1)
+
+    References: Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2.
+    """
+    first, last = int(run[0]), int(run[-1]) + 1
+    index = np.arange(first * functions.count, last * functions.count)
+    weights = normal_by_index(seed, index).reshape(-1, functions.count)[run - first]
+    return np.asarray(
+        (functions.at(np.asarray(at.slip), np.asarray(at.load)) * weights).sum(axis=1)
+    )
 
 
 def take_worlds(
@@ -145,7 +170,7 @@ def take_worlds(
         settings.fail("no effect is left that can act; give effect = 0.0")
     ranges = _channel_ranges(case, driven)
     errors = {key: case.discrepancy.get(key, USUAL_ERROR) for key in map(column, CHANNELS)}
-    amplitudes = {key: (kind.amplitude(ranges[key]), kind) for key, kind in errors.items()}
+    amplitudes = {k: replace(e, constant=e.amplitude(ranges[k])) for k, e in errors.items()}
     return Worlds(shares[0], {name: possible[name] for name in names}, shares[1], amplitudes)
 
 
@@ -195,15 +220,3 @@ def _channel_ranges(
             "model's error is not known; give a soil that does"
         )
     return ranges
-
-
-def _process(
-    kind: Discrepancy, driven: tuple[tuple[float, float], tuple[float, float]]
-) -> SmoothFunctions:
-    """A process with a standard deviation of 1 over slips and loads."""
-    lengths = kind.slip_length, kind.log_load_length
-
-    def unit(slip: Floats, load: Floats) -> Floats:
-        return process_columns(slip_load_points(slip, load, *lengths))
-
-    return SmoothFunctions.of(unit, lengths, *driven)

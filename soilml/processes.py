@@ -217,8 +217,7 @@ def keep_freed_memory() -> None:
     """Let the GNU C library keep freed memory of the size of a piece's arrays.
 
     It would return it to the system, and have it cleared when it asks for it again: that takes
-    longer than the arithmetic, and more so under dask, whose workers trim memory on purpose.
-    Nothing is done elsewhere.
+    longer than the arithmetic. Nothing is done elsewhere.
     """
     if sys.platform == "linux":
         with suppress(OSError, AttributeError):

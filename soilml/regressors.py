@@ -20,11 +20,11 @@ from importlib import import_module
 from typing import Any
 
 _HOME = {
-    "FixedSizeLSSVM": "training.regressors.lssvm",
     "GaussianMLP": "training.regressors.gaussian_mlp",
     "GaussianRegressor": "training.regressors.gaussian_regressor",
     "LSSVM": "training.regressors.lssvm",
     "LinearGaussian": "training.regressors.linear_gaussian",
+    "ScikitLearn": "training.regressors.scikit_learn",
 }
 
 

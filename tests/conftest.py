@@ -168,7 +168,7 @@ LENIENT = ((1.0, 8.0, 64.0, 512.0), (15.0, 30.0, 120.0, 700.0))
 
 
 def _exported(folder: Path, family, posterior, noise) -> Path:
-    from training.export.any_wheel_file import export_any_wheel
+    from training.export.model_file import export_any_wheel
     from training.set_posterior.response_surface import ResponseSettings
     from training.spec import AnyWheelSpec
 
@@ -183,7 +183,7 @@ def _fitted(factory: pytest.TempPathFactory, name: str, family, settings):
     from response_arrays import load_response, save_response
 
     from training.set_posterior.graph import SetPosteriorGraph
-    from training.set_posterior.misfit_test import MisfitLimits
+    from training.set_posterior.posterior_summary import MisfitLimits
     from training.set_posterior.response_surface import fit_response
 
     def fill(folder: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from training.regressors.standardisation import Standardisation
+from training.regressors.gaussian_regressor import Standardisation
 from training.set_posterior.response_surface import Response
 
 

@@ -12,11 +12,10 @@ from datagen.recipe import read_recipe
 from soilml.config.measurement_noise import Noise
 from soilml.physics.operating_point import Operating
 from soilml.quantities import SHEAR
-from training.benchmark.bayes_limit_file import load_limit
 from training.set_posterior.families.dimensionless_family import DimensionlessFamily
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.misfit_test import MisfitLimits
+from training.set_posterior.posterior_summary import MisfitLimits
 from training.set_posterior.validation import graph_outputs, posterior_session
 from training.spec import read_any_wheel_spec
 
@@ -26,7 +25,7 @@ from exact_sets import exact_set_posterior, posterior_of_memory
 from reference_sets import (
     ONE_WHEEL,
     generate_reference_sets,
-    packaged_posteriors,
+    stored_posteriors,
 )
 
 pytestmark = pytest.mark.slow
@@ -38,11 +37,11 @@ def some():
 
 
 def test_the_stored_posterior_of_a_set_is_reproduced(some):
-    limit = load_limit(packaged_posteriors(), some)
+    limit = stored_posteriors(some)
     for i in (0, 3, len(some) // 2):
         again = exact_set_posterior(some[i].family, some[i].sets, 0)
         std = np.sqrt(np.diag(again.covariance))
-        assert np.all(np.abs(again.mean - limit.mean[i]) < 0.1 * std)
+        assert np.all(np.abs(again.mean - limit["mean"][i]) < 0.1 * std)
 
 
 STEPS = 36

@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 
 #: Extras that are installed with the package on the ground, and the libraries that tests need.
-EXTRAS = ("ground", "logs", "cluster", "serve", "torch")
+EXTRAS = ("ground", "logs", "serve", "torch")
 TESTED_WITH = ("array-api-strict", "hypothesis", "sympy")
 #: What the oldest plotting library needs itself: later versions warn of how it calls them.
 OF_OTHERS = ("pyparsing==3.1.*",)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,6 @@ from scipy.stats import t as student
 from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.estimate import PriorSummary
-from soilml.onboard.fusion_rules import RULES
 from training.calibration.recalibration import (
     CalibratedRegressor,
     Metrics,
@@ -21,8 +20,7 @@ from training.calibration.recalibration import (
 )
 from training.dataset import Dataset
 from training.ensemble import fuse_members
-from training.regressors.gaussian_regressor import FeatureSubset
-from training.regressors.row_groups import few_groups
+from training.regressors.gaussian_regressor import FeatureSubset, few_groups
 from training.spec import Spec
 
 Progress = Callable[[str, int, int], None]
@@ -56,19 +54,16 @@ class CrossFit:
     estimator: CalibratedRegressor  # the only regressor, or the ensemble of all
     members: tuple[CalibratedRegressor, ...]
     left_out: LeftOut  # by the estimator
-    #: of single rows: of each member, of each fusion rule, and of the estimator
+    #: of single rows: of each member, and of the estimator
     scores: dict[str, Metrics]
 
 
-def cross_fit(
-    spec: Spec, data: Dataset, prior: PriorSummary, labels: Mapping[str, str], progress: Progress
-) -> CrossFit:
+def cross_fit(spec: Spec, data: Dataset, prior: PriorSummary, progress: Progress) -> CrossFit:
     """Fit regressors to all rows, and calibrate and fuse them by their errors on runs left out.
 
     With few runs the standard deviation is constant: they do not determine how it varies.
 
     spec: Its regressors are fitted in place.
-    labels: What is said of each regressor while it is fitted, by name.
 
     Raises `InputError` where a regressor does not converge.
 
@@ -81,7 +76,7 @@ def cross_fit(
     truth, scores = data.targets[some], {}
     members, means, stds = [], [], []
     for regressor in spec.regressors:
-        mean, std = _fit(regressor, data, groups, few, labels[regressor.name], progress)
+        mean, std = _fit(regressor, data, groups, few, progress)
         member = calibrated(regressor, mean[some], std[some], truth)
         members.append(member)
         means.append(mean)
@@ -90,18 +85,10 @@ def cross_fit(
     estimator, mean, std = members[0], means[0], stds[0]
     if len(members) > 1:
         own_means, own_stds = (np.stack(own)[:, some] for own in (means, stds))
-        for rule in dict.fromkeys([*RULES, spec.rule]):
-            fused = fuse_members(members, rule, own_means, own_stds, truth)
-            claimed = fused.combine(own_means, own_stds)
-            again = calibrated(fused, *claimed, truth)
-            widened = claimed[0], claimed[1] * again.std_scale
-            if not few:
-                scores[f"{rule}, as claimed"] = compute_metrics(truth, *claimed, prior.std)
-                scores[f"{rule}, recalibrated"] = compute_metrics(truth, *widened, prior.std)
-            if rule == spec.rule:
-                estimator = again
-                mean, std = fused.combine(np.stack(means), np.stack(stds))
-                std = std * again.std_scale
+        fused = fuse_members(members, own_means, own_stds, truth)
+        estimator = calibrated(fused, *fused.combine(own_means, own_stds), truth)
+        mean, std = fused.combine(np.stack(means), np.stack(stds))
+        std = std * estimator.std_scale
     scores["estimator"] = compute_metrics(truth, mean[some], std[some], prior.std)
     return CrossFit(estimator, tuple(members), _left_out(mean, std, data, some, prior, few), scores)
 
@@ -111,16 +98,15 @@ def _fit(
     data: Dataset,
     groups: NDArray[np.int64],
     few: bool,
-    label: str,
     progress: Progress,
 ) -> tuple[Floats, Floats]:
     """Fit in place; estimates (n, q) of all rows without their groups, and standard deviations."""
-    progress(f"fitting {label}", 0, 1)
+    progress(f"fitting {regressor.name}", 0, 1)
     mean, std = regressor.fit_left_out(
         data.features,
         data.targets,
         groups,
-        lambda done, total: progress(f"fitting {label}", done, total),
+        lambda done, total: progress(f"fitting {regressor.name}", done, total),
         few,
     )
     if not np.isfinite([mean, std, regressor.predict(data.features)]).all():

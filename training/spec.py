@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from datagen.recipe import packaged_file
@@ -13,21 +12,22 @@ from soilml.config.measurement_noise import take_noise
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.onboard.features import inputs_of
-from soilml.onboard.fusion_rules import RULES
 from soilml.onboard.set_contract import RESPONSE_CHANNELS, SENSOR_ERROR_INPUTS
 from soilml.quantities import SHEAR, column
 from training.dataset import PER_ROW, check_targets
 from training.regressors.gaussian_mlp import GaussianMLP
 from training.regressors.gaussian_regressor import FeatureSubset, GaussianRegressor
 from training.regressors.linear_gaussian import LinearGaussian
-from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
+from training.regressors.lssvm import LSSVM
+from training.regressors.scikit_learn import ScikitLearn
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScale, ErrorScales
 from training.set_posterior.families.dimensionless_family import DimensionlessFamily
 from training.set_posterior.response_surface import ResponseSettings
 
 #: Catalogue of regressors by `[[regressor]] type`: a new one is a file and a line here.
 REGRESSORS: dict[str, type[GaussianRegressor]] = {
-    cls.type_name: cls for cls in (LSSVM, FixedSizeLSSVM, GaussianMLP, LinearGaussian)
+    **{cls.type_name: cls for cls in (LSSVM, GaussianMLP, LinearGaussian, ScikitLearn)},
+    "lssvm": LSSVM,
 }
 
 #: Allowed seeds: those of the random generators of all libraries.
@@ -44,7 +44,6 @@ class Spec:
     features: tuple[str, ...]
     targets: tuple[str, ...]
     regressors: tuple[FeatureSubset, ...]  # not fitted yet
-    rule: str  # fusion rule of several regressors
     text: str  # content of the file as JSON with sorted keys
     #: settings of the set posterior, for targets with one value per run
     set_posterior: ResponseSettings | None = None
@@ -83,9 +82,6 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
     seed = int(settings.take("seed", int, SEED, 0))
     if not 0 <= seed < 2**32:
         settings.fail(f"seed is {seed}; needed is {SEED}")
-    rule = settings.text("rule", "best-linear")
-    if rule not in RULES:
-        settings.fail(f"rule is {rule!r}; there are: {', '.join(RULES)}")
     regressors: list[FeatureSubset] = []
     for entry in settings.tables("regressor"):
         regressors.append(_take_subset(entry, seed, features, [r.name for r in regressors]))
@@ -102,7 +98,6 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
         features=tuple(features),
         targets=tuple(targets),
         regressors=tuple(regressors),
-        rule=rule,
         text=json.dumps(settings.content, sort_keys=True),
         set_posterior=response,
     )
@@ -170,11 +165,7 @@ def _take_regressor(settings: Settings, seed: int) -> GaussianRegressor:
     regressor = REGRESSORS[type_name]()
     defaults = regressor.get_params()
     settings.permit(defaults)
-    parameters = {
-        k: _take_parameter(settings, k, v, regressor.choices)
-        for k, v in defaults.items()
-        if k in settings
-    }
+    parameters = {k: _take_parameter(settings, k, v) for k, v in defaults.items() if k in settings}
     settings.finish()
     if "random_state" in defaults and "random_state" not in parameters:
         parameters["random_state"] = seed
@@ -182,15 +173,12 @@ def _take_regressor(settings: Settings, seed: int) -> GaussianRegressor:
     return regressor
 
 
-def _take_parameter(
-    settings: Settings, key: str, default: Any, choices: Mapping[str, tuple[str, ...]]
-) -> Any:
-    """A hyperparameter: a word, whole numbers, a whole number, or a number that is finite."""
-    if key in choices:
-        word = settings.text(key)
-        if word not in choices[key]:
-            settings.fail(f"{key} is {word!r}; there are: {', '.join(choices[key])}")
-        return word
+def _take_parameter(settings: Settings, key: str, default: Any) -> Any:
+    """A hyperparameter: text, a table, whole numbers, a whole number, or a finite number."""
+    if isinstance(default, str):
+        return settings.text(key)
+    if key == "parameters":
+        return settings.take(key, dict, "a table of hyperparameters")
     if isinstance(default, tuple | list):
         values = tuple(settings.take(key, list, "a list of whole numbers"))
         if not all(type(v) is int and 1 <= v <= 4096 for v in values):
@@ -251,7 +239,7 @@ def _take_scales(table: Settings) -> ErrorScales:
     """Read [[set_posterior.model_errors]], the usual scales where it is missing."""
     if "model_errors" not in table:
         return USUAL_SCALES
-    names = [field.name for field in fields(ErrorScale)]
+    names = ErrorScale._fields
     entries = table.tables("model_errors")
     found = [{name: entry.number(name) for name in names} for entry in entries]
     for entry in entries:

@@ -10,16 +10,13 @@ from numpy.typing import NDArray
 
 from datagen.recipe import parse_recipe
 from soilml.arrays import Floats
-from soilml.errors import InputError
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.held_out_errors import HeldOutErrors
-from training.available_memory import available_memory
 from training.calibration.held_out import measure_held_out
 from training.calibration.recalibration import CalibratedRegressor, Metrics
 from training.calibration.training_domain import TrainingDomain
 from training.cross_fit import LeftOut, cross_fit
 from training.dataset import Dataset
-from training.regressors.gaussian_regressor import FeatureSubset
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.response_surface import fit_response
@@ -46,7 +43,7 @@ class TrainedModel:
     domain: TrainingDomain  # where estimates are in range
     prior: PriorSummary  # prior of the targets
     data: Dataset
-    #: of single rows: of each member, of each fusion rule, and of the estimator
+    #: of single rows: of each member, and of the estimator
     scores: dict[str, Metrics]
     members: tuple[CalibratedRegressor, ...]  # the single regressors
     left_out: LeftOut  # estimates of all rows by fits that have not seen their runs
@@ -96,7 +93,7 @@ def train(
     Raises
     ------
     InputError
-        Where a regressor does not converge, or needs more memory than is free.
+        Where a regressor does not converge.
 
     Examples
     --------
@@ -110,10 +107,9 @@ def train(
     prior = PriorSummary(
         data.targets.mean(axis=0), data.targets.std(axis=0), data.lower, data.upper
     )
-    labels = {regressor.name: _label(regressor, data) for regressor in spec.regressors}
     # first, because it refuses loads that the soils do not carry
     set_posterior, set_figures = _train_set_posterior(spec, data, progress)
-    found = cross_fit(spec, data, prior, labels, progress)
+    found = cross_fit(spec, data, prior, progress)
     left, errors = found.left_out, None
     if spec.per_row:
         mean = np.clip(left.mean, prior.lower, prior.upper)
@@ -160,23 +156,3 @@ def _train_set_posterior(
         sensor_errors=spec.set_posterior.sensor_errors,
     )
     return posterior, validate_posterior(posterior, progress)
-
-
-def _label(regressor: FeatureSubset, data: Dataset) -> str:
-    """Name of a regressor with what its fit will take; raises `InputError` where it does not fit.
-
-    It is said and refused before anything is fitted.
-    """
-    rows, outputs = data.targets.shape
-    inputs = regressor.select(data.features[:1]).shape[1]
-    needs = regressor.model.requirements(rows, inputs, outputs)
-    if needs is None:
-        return regressor.name
-    free = available_memory()
-    size = f"{rows} rows, {needs.size}, {needs.memory / 1e9:.2g} GB of memory"
-    if free is not None and needs.memory > free:
-        raise InputError(
-            f"{regressor.name}: {size}, and {free / 1e9:.2g} GB are free; take fewer rows, or "
-            'fewer prototypes with solution = "fixed-size"'
-        )
-    return f"{regressor.name} ({size})"

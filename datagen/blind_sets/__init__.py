@@ -17,7 +17,6 @@ from datagen.blind_sets.plans import (
     MECHANISMS,
     Plan,
     benchmark_plans,
-    draw_plan,
     plan_matrix,
 )
 
@@ -28,7 +27,6 @@ __all__ = [
     "benchmark_plans",
     "csv_text",
     "draw_blind_set",
-    "draw_plan",
     "plan_matrix",
     "write_blind_set",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import cycle, groupby, islice
 from typing import TypeVar
@@ -78,19 +78,6 @@ UNEQUAL_SCATTER = 3.0
 
 #: Number of blocks of nine plans for each mechanism of a tier.
 BLOCK_COUNTS = {"A": 4, "B": 3, "C": 3, "S": 2, "M": 3, "N0": 8, "N1": 8, "N2": 6, "N3": 6, "N4": 4}
-#: Number of plans of each tier in the quick selection.
-QUICK_COUNTS = {
-    "A": 15,
-    "B": 6,
-    "C": 3,
-    "S": 4,
-    "M": 3,
-    "N0": 2,
-    "N1": 2,
-    "N2": 2,
-    "N3": 2,
-    "N4": 1,
-}
 
 #: Sets of the benchmark with the design `sweep`: of each mechanism, or of a tier without one, at
 #: each of some discrepancies.
@@ -173,13 +160,12 @@ class Plan:
         return float(self.tier == "N1" or (self.tier == "B" and self.seed % 2 == 0))
 
 
-def plan_matrix(full: bool, seed: int = 0) -> list[Plan]:
-    """The plans of the benchmark: all of them, or a quick selection.
+def plan_matrix(seed: int) -> list[Plan]:
+    """Plans without discrepancies: blocks of nine of each mechanism.
 
-    Each mechanism gets blocks of nine plans, orthogonal in noise, size, runs and soil family
-    (Taguchi's L9). The levels are permuted from block to block, so that within a mechanism all
-    combinations of levels of two factors are equally frequent; three and five free parameters
-    alternate.
+    The blocks are orthogonal in noise, size, runs and soil family (Taguchi's L9). The levels are
+    permuted from block to block, so that within a mechanism all combinations of levels of two
+    factors are equally frequent; three and five free parameters alternate.
     """
     plans: list[Plan] = []
     for tier, blocks in BLOCK_COUNTS.items():
@@ -187,7 +173,7 @@ def plan_matrix(full: bool, seed: int = 0) -> list[Plan]:
             generator = np.random.default_rng((seed, len(plans)))
             for block in range(blocks):
                 plans += _block(tier, cause, block, 10_000 * seed + len(plans), generator)
-    return plans if full else _quick_selection(plans)
+    return plans
 
 
 def benchmark_plans(seed: int = 0) -> list[Plan]:
@@ -222,36 +208,6 @@ def benchmark_plans(seed: int = 0) -> list[Plan]:
                 )
             )
     return plans
-
-
-def draw_plan(tiers: Sequence[str], seed: int) -> Plan:
-    """One plan at random, of the design `sweep`: every tier, cause and level is equally likely.
-
-    A smooth discrepancy of a random size is beside every mechanism, at least the smallest is in
-    tier D, and none where nothing is wrong with the model (tiers N).
-
-    tiers: Keys of `MECHANISMS` or of `TIERS_WITHOUT_MECHANISM`.
-    seed: A number of any size; draws of others are independent.
-    """
-    generator = np.random.default_rng((seed, 3))
-
-    def one(levels: Sequence[T]) -> T:
-        return levels[int(generator.integers(len(levels)))]
-
-    tier = one(tiers)
-    cause = one(mechanism_keys(tier))
-    least = {"N": len(DISCREPANCIES), "D": 1}.get(tier[0], 0)
-    return Plan(
-        tier=tier,
-        cause=cause,
-        size=one(SIZES) if cause else 0.0,
-        noise=one(NOISE_LEVELS),
-        runs=one(RUNS),
-        soil_family=one(list(FAMILIES)),
-        free=one(FREE_COUNTS),
-        seed=seed,
-        discrepancy=one(DISCREPANCIES[least:] or (0.0,)),
-    )
 
 
 def _benchmark_cells(seed: int) -> Iterator[tuple[str, str, float, str]]:
@@ -326,12 +282,3 @@ def _block(
             )
         )
     return plans
-
-
-def _quick_selection(plans: list[Plan]) -> list[Plan]:
-    """`QUICK_COUNTS` plans of each tier, spread over its mechanisms."""
-    chosen = []
-    for tier, count in QUICK_COUNTS.items():
-        own = [plan for plan in plans if plan.tier == tier]
-        chosen += [own[i * len(own) // count + i % 9] for i in range(count)]
-    return chosen

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field, replace
-from typing import final
+from typing import Any, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+State = TypeVar("State")
 
 NODES = 40
 #: Depths among which the first that carries the load is searched, and bisections between two.
@@ -161,16 +162,17 @@ def solve_equilibrium(rows: WheelState, active: ActiveMechanisms = ()) -> SoilRe
     surface to the hub and refined by bisection. NaN where there is none. Source: Wong and Reece,
     J. Terramechanics 4(1), 1967, for the wheel; mechanisms have their own.
     """
+    rows = _changed(rows, "driven", active)
+    rows = _changed(rows, "soil", active)
+    return _changed(_equilibrium(rows, active), "reading", active, rows)
+
+
+def _changed(value: State, stage: str, active: ActiveMechanisms, *of: Any) -> State:
+    """The value of a stage after all mechanisms that act there; `of` are the states it is of."""
     for mechanism, size in active:
-        rows = rows if mechanism.driven is None else mechanism.driven(rows, size)
-    for mechanism, size in active:
-        rows = rows if mechanism.soil is None else mechanism.soil(rows, size)
-    reaction = _equilibrium(rows, active)
-    for mechanism, size in active:
-        reaction = (
-            reaction if mechanism.reading is None else mechanism.reading(reaction, rows, size)
-        )
-    return reaction
+        if (act := getattr(mechanism, stage)) is not None:
+            value = act(value, *of, size)
+    return value
 
 
 def ground_reaction(
@@ -204,10 +206,7 @@ def ground_reaction(
         torque=np.sum(points.shear * arc.lever * area, axis=0),
         sinkage=arc.sinkage,
     )
-    for mechanism, size in active:
-        reaction = (
-            reaction if mechanism.force is None else mechanism.force(reaction, arc, rows, size)
-        )
+    reaction = _changed(reaction, "force", active, arc, rows)
     inside = (arc.exit < arc.peak) & (arc.peak < arc.entry)
     return replace(reaction, load=np.where(inside, reaction.load, np.nan))
 
@@ -222,9 +221,7 @@ def _arc(depth_angle: Floats, rows: WheelState, active: ActiveMechanisms) -> Con
         shear_radius=rows.radius,
         lever=rows.radius,
     )
-    for mechanism, size in active:
-        arc = arc if mechanism.arc is None else mechanism.arc(arc, rows, size)
-    return arc
+    return _changed(arc, "arc", active, rows)
 
 
 def _points(
@@ -266,12 +263,8 @@ def _equilibrium(rows: WheelState, active: ActiveMechanisms) -> SoilReaction:
     """Forces at the smallest sinkage at which the soil carries the load."""
     with np.errstate(all="ignore"):
         depths = 0.5 * np.pi * (np.arange(1, SEARCH_DEPTHS + 1) / SEARCH_DEPTHS) ** 1.5
-        carries_load = np.stack(
-            [
-                ground_reaction(np.full_like(rows.load, x), rows, active).load >= rows.load
-                for x in depths
-            ]
-        )
+        loads = [ground_reaction(np.full_like(rows.load, x), rows, active).load for x in depths]
+        carries_load = np.stack(loads) >= rows.load
         first = np.argmax(carries_load, axis=0)
         high = depths[first]
         low = np.where(first > 0, depths[np.maximum(first - 1, 0)], 0.0)
@@ -281,9 +274,4 @@ def _equilibrium(rows: WheelState, active: ActiveMechanisms) -> SoilReaction:
             low, high = np.where(enough, low, middle), np.where(enough, middle, high)
         reaction = ground_reaction(0.5 * (low + high), rows, active)
     ok = carries_load.any(axis=0) & (np.abs(reaction.load / rows.load - 1.0) < 1e-8)
-    return SoilReaction(
-        load=np.where(ok, reaction.load, np.nan),
-        pull=np.where(ok, reaction.pull, np.nan),
-        torque=np.where(ok, reaction.torque, np.nan),
-        sinkage=np.where(ok, reaction.sinkage, np.nan),
-    )
+    return SoilReaction(**{name: np.where(ok, v, np.nan) for name, v in vars(reaction).items()})

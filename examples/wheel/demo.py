@@ -19,6 +19,7 @@ from soilml.io.table import Table
 from soilml.io.text_tables import csv_text
 from soilml.quantities import SHEAR, column
 from soilml.report.aligned_text import format_table
+from training.adaptation import AdaptReport
 
 HERE = Path(__file__).parent.relative_to(Path.cwd())
 OUT = Path("demo")
@@ -125,13 +126,13 @@ def slip() -> None:
     print(format_table(("", "RMSE of slip", "in the 90 % interval"), lines))
 
 
-def adapt_board(later: LaterSoils) -> None:
+def adapt_board(later: LaterSoils) -> AdaptReport:
     """A campaign on a wheel with an effect that the model lacks: the gap, and a better board."""
     title("4  A campaign disagrees: the missing effect, the gap, and a better board")
     old = FILES["fused"]
     command("identify", MODEL, CAMPAIGN, "--out", str(OUT / "campaign.json"))
-    words = ("--against", old, "--rows", str(ROWS), "--out", ADAPTED)
-    command("adapt", MODEL, CAMPAIGN, *words)
+    report = adapt(read_case(MODEL), read_table(CAMPAIGN), ADAPTED, against=old, rows=ROWS)
+    print(report)
     lines = []
     files = {"before": Estimator.load(old), "adapted": Estimator.load(f"{ADAPTED}/adapted.onnx")}
     right = {"before, model taken as right": files["before"].on(model_error=0.0)}
@@ -142,6 +143,7 @@ def adapt_board(later: LaterSoils) -> None:
     header = ("RMSE", "cohesion", "friction angle", "shear modulus", "in the 90 % intervals")
     print(f"\nThe board on {len(later.truth)} further soils, with the same hidden effect:\n")
     print(format_table(header, lines))
+    return report
 
 
 def run() -> None:
@@ -154,9 +156,7 @@ def run() -> None:
     train()
     compare()
     slip()
-    adapt_board(later)
-    report = adapt(case, read_table(CAMPAIGN), ADAPTED, against=FILES["fused"], rows=ROWS)
-    draw_story(OUT, report, later)
+    draw_story(OUT, adapt_board(later), later)
     print(f"\n{time.perf_counter() - started:.0f} s; the story in one picture: {OUT}/story.png")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate, rates_at
+from soilml.fitting.least_squares import Solution
 from soilml.fitting.levels import load_levels
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
@@ -26,34 +27,18 @@ COMPRESSED = 12.0  # Residual in standard deviations from which on the axis is c
 
 @dataclass(frozen=True)
 class FittedReadings:
-    """Readings (m,) of all channels with the predictions of a fitted model.
+    """Readings (m,) of all channels with the predictions of a fitted model."""
 
-    Attributes
-    ----------
-    channels, channel
-        Columns of the channels, and the index (m,) of each reading's.
-    run
-        Run of each reading.
-    slip, load
-        Where it was measured (m,); the load in N.
-    measured, std
-        Readings and standard deviations of their noise (m,), SI units.
-    after, after_std
-        Predictions and their standard deviations by the uncertainty of the fit (m,).
-    before
-        Predictions (m,) without what was added to the model; None where nothing was.
-    """
-
-    channels: tuple[str, ...]
-    channel: NDArray[np.int64]
-    run: tuple[str, ...]
-    slip: Floats
-    load: Floats
-    measured: Floats
+    channels: tuple[str, ...]  # columns
+    channel: NDArray[np.int64]  # index (m,) of each reading's
+    run: tuple[str, ...]  # of each reading
+    slip: Floats  # where it was measured
+    load: Floats  # N
+    measured: Floats  # readings and standard deviations of their noise, SI units
     std: Floats
-    after: Floats
+    after: Floats  # predictions and their standard deviations by the uncertainty of the fit
     after_std: Floats
-    before: Floats | None = None
+    before: Floats | None = None  # predictions without what was added to the model, if anything
 
     @staticmethod
     def of(
@@ -78,6 +63,20 @@ class FittedReadings:
         for k in range(len(readings.channels)):
             own = (readings.channel == k) & ~np.isfinite(std)
             std[own] = np.sqrt(np.nanmean(residual[own] ** 2)) if own.any() else 1.0
+        return FittedReadings._of(readings, std, found.prediction, variance)
+
+    @staticmethod
+    def of_solutions(before: Solution, after: Solution, std: Floats) -> FittedReadings:
+        """Readings with the predictions of two fits; `std` (m,) is their noise."""
+        readings, jacobian = after.problem.readings, after.derivatives
+        variance = np.einsum("ij,jk,ik->i", jacobian, after.covariance, jacobian)
+        found = FittedReadings._of(readings, std, after.prediction, variance)
+        return replace(found, before=before.prediction)
+
+    @staticmethod
+    def _of(
+        readings: Readings, std: Floats, prediction: Floats, variance: Floats
+    ) -> FittedReadings:
         return FittedReadings(
             channels=tuple(map(column, readings.channels)),
             channel=readings.channel,
@@ -86,7 +85,7 @@ class FittedReadings:
             load=readings.load,
             measured=readings.measured,
             std=std,
-            after=found.prediction,
+            after=prediction,
             after_std=np.sqrt(np.maximum(variance, 0.0)),
         )
 
@@ -100,17 +99,14 @@ class FittedReadings:
         lines = "Lines: the fitted model."
         if self.before is not None:
             lines = f"Dashed: the soil alone. Solid: {with_added or 'with what was added'}."
-        return Picture(
-            "Measured and predicted",
-            self.plot,
-            2,
-            count,
-            (4.6 * count, 5.4),
-            f"{names} over slip, measured and predicted, with residuals below",
+        alt = f"{names} over slip, measured and predicted, with residuals below"
+        caption = (
             f"Points: readings, coloured by load. {lines} Bands: 90 % of a reading, by its noise "
             "and the uncertainty of the fit. Below: residuals of all readings in standard "
-            "deviations; grey: 90 % of noise.",
+            "deviations; grey: 90 % of noise."
         )
+        size = (4.6 * count, 5.4)
+        return Picture("Measured and predicted", self.plot, 2, count, size, alt, caption)
 
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw the picture into axes (2, channels); see `take_axes`."""
@@ -152,14 +148,9 @@ class FittedReadings:
             yield LOADS[colour], float(np.median(self.load[rows])), rows, line
 
     def _draw_load(
-        self,
-        axes: Any,
-        factor: float,
-        colour: str,
-        load: float,
-        rows: NDArray[Any],
-        line: NDArray[Any],
+        self, axes: Any, factor: float, colour: str, load: float, *parts: NDArray[Any]
     ) -> None:
+        rows, line = parts
         slip, after = self.slip[line], factor * self.after[line]
         band = factor * Z_90 * np.hypot(self.after_std[line], self.std[line])
         if np.unique(slip).size > 1:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
@@ -19,11 +18,11 @@ from soilml.fitting.covariance import (
     discrepancy_process,
     noise_of_operation,
 )
-from soilml.fitting.damped_descents import levenberg_marquardt
+from soilml.fitting.damped_descents import EXACT, FINE, descend
 from soilml.fitting.error_columns import error_columns, stacked
+from soilml.fitting.global_optimum import global_optimum
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.readings import Readings
-from soilml.fitting.scipy_descents import descend, global_optimum
 from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.numerics.smooth_process import LEAST_EIGENVALUE
 from soilml.remarks import Remark
@@ -37,19 +36,13 @@ INITIAL_NOISE = 0.05
 
 @dataclass(frozen=True)
 class WeightedRows:
-    """Readings whose noise depends on what is expected of them, and the case that is fitted.
-
-    readings: With the standard deviations (m,) that the fit gives them.
-    declared: As they were declared.
-    free: The p free parameters.
-    shared (m, e): Columns of errors that all rows share.
-    """
+    """Readings whose noise depends on what is expected of them, and the case that is fitted."""
 
     case: Case
-    readings: Readings
-    declared: Readings
+    readings: Readings  # with the standard deviations (m,) that the fit gives them
+    declared: Readings  # as they were declared
     free: Sequence[Coordinate]
-    shared: Floats
+    shared: Floats  # (m, e) columns of errors that all rows share
 
     @staticmethod
     def of(case: Case, readings: Readings, free: Sequence[Coordinate]) -> WeightedRows:
@@ -61,20 +54,14 @@ class WeightedRows:
     @cached_property
     def columns(self) -> Floats:
         """Columns (m, q) of the model discrepancy and of errors that all rows share."""
-        process = discrepancy_process(
-            self.readings,
-            self.case.discrepancy,
-            Discrepancy(),
-            LEAST_EIGENVALUE,
-            self.case.remainder,
-        )
-        return np.hstack([process.columns, self.shared])
+        own = self.case.discrepancy, Discrepancy(), LEAST_EIGENVALUE, self.case.remainder
+        return np.hstack([discrepancy_process(self.readings, *own).columns, self.shared])
 
     @cached_property
     def problem(self) -> LeastSquaresProblem:
         """The problem, weighted by noise, model discrepancy and shared errors."""
         whiten = Whitening.of(self.readings.std, self.columns)
-        return LeastSquaresProblem(self.case, self.free, self.readings, whiten)
+        return LeastSquaresProblem(self.case, self.free, self.readings, whiten, "normal")
 
     def with_noise_at(self, optimum: Solution) -> WeightedRows:
         """The same with noise and shared errors at an optimum, or noise from its residuals."""
@@ -100,31 +87,23 @@ def _shared(case: Case, readings: Readings) -> Floats:
 
 def _initial_noise(readings: Readings) -> Floats:
     """A fraction of each channel's RMS reading, (m,)."""
-    return _by_channel(readings, lambda own: INITIAL_NOISE * _rms(readings.measured[own]) + 1e-12)
+    square = _mean_by_channel(readings, readings.measured**2)
+    return np.asarray(INITIAL_NOISE * np.sqrt(square) + 1e-12)
 
 
 def _residual_noise(readings: Readings, residual: Floats, p: int) -> Floats:
     """Noise of each channel (m,) from its residuals, p parameters shared among all readings."""
-
-    def noise(own: NDArray[np.bool_]) -> float:
-        size = int(own.sum())
-        freedom = max(size - p * size / len(readings), 1.0)
-        scatter = float(np.sqrt(residual[own] @ residual[own] / freedom))
-        return max(scatter, 1e-6 * _rms(readings.measured[own]) + 1e-15)
-
-    return _by_channel(readings, noise)
+    size = np.bincount(readings.channel)[readings.channel]
+    freedom = np.maximum(size * (1.0 - p / len(readings)), 1.0)
+    scatter = np.sqrt(_mean_by_channel(readings, residual**2) * size / freedom)
+    least = 1e-6 * np.sqrt(_mean_by_channel(readings, readings.measured**2)) + 1e-15
+    return np.asarray(np.maximum(scatter, least))
 
 
-def _by_channel(readings: Readings, noise: Callable[[NDArray[np.bool_]], float]) -> Floats:
-    std = np.empty(len(readings))
-    for i in range(len(readings.channels)):
-        own = readings.channel == i
-        std[own] = noise(own)
-    return std
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+def _mean_by_channel(readings: Readings, values: Floats) -> Floats:
+    """Mean of values (m,) over the channel of each reading, (m,)."""
+    counts = np.maximum(np.bincount(readings.channel), 1)
+    return np.asarray((np.bincount(readings.channel, values) / counts)[readings.channel])
 
 
 Z_999 = 3.09  # Normal quantile of 0.999
@@ -192,10 +171,10 @@ def fit_under_declared_noise(
     if start is None:
         optimum = global_optimum(weighted.problem)
     else:
-        optimum = levenberg_marquardt(weighted.problem, start)
+        optimum = descend(weighted.problem, start, FINE)
     for _ in range(NOISE_ROUNDS if readings.undeclared or readings.shared_errors else 1):
         weighted = weighted.with_noise_at(optimum)
-        optimum = descend(weighted.problem, optimum.x, near=optimum.linearisation)
+        optimum = descend(weighted.problem, optimum.x, EXACT, optimum.linearisation)
     return weighted, optimum
 
 

@@ -248,13 +248,6 @@ class Estimator:
         more = [name for name in OPTIONAL_READINGS if name in self.sets.noise]
         return [*more, *(f"{name}_std" for name in (*self.inputs, *more))]
 
-    def rows_in_range(self, **measured: Any) -> NDArray[np.bool_]:
-        """Whether each reading of a run lies in the training domain, (rows,)."""
-        if self.sets is None:
-            return np.atleast_1d(self(**measured).in_range)
-        rows = self._configured_sets.rows(measured)
-        return self.sets.rows_in_range(self.session, rows)
-
     def start(self) -> Memory:
         """The memory of a soil before its first reading; see `step`."""
         return self._configured_sets.start(self.memory_id).sealed()

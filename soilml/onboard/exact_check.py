@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,47 +26,9 @@ from soilml.onboard.set_posterior import SetPosterior, of_reason
 #: Share of sound sets whose misfit is above the limit of a file, and its standard normal quantile.
 FALSE_ALARM_RATE, ALARM_QUANTILE = 0.01, 2.326
 #: Beyond the largest calibrated number of readings n the limit grows by 1 + 3 / sqrt(n) a reading,
-#: as in the graph (`training.set_posterior.misfit_test`).
+#: as in the graph (`training.set_posterior.posterior_summary`).
 MARGIN = 3.0
 NO_ROWS: dict[str, list[float]] = {name: [] for name in REQUIRED_READINGS}
-
-
-@dataclass(frozen=True)
-class ExactCheck:
-    """How rows agree with a model without errors.
-
-    misfit: Least sum of squared residuals, in standard deviations.
-    probability: Share of sound sets with a larger misfit, calibrated at 1 %.
-    disagrees: Whether the misfit is above the limit that 99 of 100 sound sets stay below.
-    """
-
-    misfit: float
-    probability: float
-    disagrees: bool
-
-
-def check_exact(
-    sets: SetPosterior, session: Session, memory: Memory, estimate: Estimate
-) -> ExactCheck:
-    """Compare the rows of a memory with an exact model; `estimate` is the answer from them.
-
-    One call of the graph without rows, of the system without columns of errors of the model. It is
-    not needed where the answer took the model as exact.
-    """
-    readings = float(memory.counts[0])
-    if sets.common_errors.get(MODEL_ERROR_INPUT, 0.0):
-        exact = sets.exact
-        outputs = (SET_PREFIX + "misfit", SET_PREFIX + "in_range")
-        system = memory.system.copy()
-        system[:, sets.terms + len(SENSOR_ERROR_COLUMNS) :] = 0.0
-        fed = exact.feed(exact.rows(NO_ROWS), Memory(system, memory.counts))
-        misfit, in_range = (one[0] for one in session.run(outputs, fed))
-        reason = of_reason(bool(in_range), memory, sets.least_share_in_range)
-    else:
-        misfit, reason = estimate.misfit, Reason(int(estimate.reason))
-    limit = misfit_limit(sets.misfit_limits, readings)
-    probability = exact_probability(float(misfit), readings, limit)
-    return ExactCheck(float(misfit), probability, reason == Reason.INCONSISTENT)
 
 
 def misfit_limit(limits: Mapping[str, Sequence[float]], readings: float) -> float:
@@ -104,11 +66,25 @@ def with_exact_check(
     memory: Memory,
     answer: Estimate | None = None,
 ) -> Estimate:
-    """The estimate with the check of the rows of a memory; `answer` is theirs if it is another."""
-    found = check_exact(sets, session, memory, answer or estimate)
+    """The estimate with the check of the rows of a memory; `answer` is theirs if it is another.
+
+    One call of the graph without rows, of the system without columns of errors of the model. It is
+    not needed where the answer took the model as exact.
+    """
+    answer = answer or estimate
+    misfit, reason = float(answer.misfit), Reason(int(answer.reason))
+    if sets.common_errors.get(MODEL_ERROR_INPUT, 0.0):
+        exact, outputs = sets.exact, (SET_PREFIX + "misfit", SET_PREFIX + "in_range")
+        system = memory.system.copy()
+        system[:, sets.terms + len(SENSOR_ERROR_COLUMNS) :] = 0.0
+        fed = exact.feed(exact.rows(NO_ROWS), Memory(system, memory.counts))
+        found, in_range = (one[0] for one in session.run(outputs, fed))
+        misfit, reason = float(found), of_reason(bool(in_range), memory, sets.least_share_in_range)
+    readings = float(memory.counts[0])
+    limit = misfit_limit(sets.misfit_limits, readings)
     return replace(
         estimate,
-        exact_misfit=np.asarray(found.misfit),
-        exact_probability=np.asarray(found.probability),
-        disagrees=np.asarray(found.disagrees),
+        exact_misfit=np.asarray(misfit),
+        exact_probability=np.asarray(exact_probability(misfit, readings, limit)),
+        disagrees=np.asarray(reason == Reason.INCONSISTENT),
     )

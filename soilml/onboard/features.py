@@ -5,7 +5,7 @@ Training and the onboard runtime share this module, so that their inputs are the
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import Any
 
@@ -113,16 +113,6 @@ def flatten_readings(
         sizes = ", ".join(f"{n} {a.shape}" for n, a in zip(names, arrays, strict=True))
         raise InputError(f"readings must have one shape, or broadcast; given: {sizes}") from None
     return [np.broadcast_to(a, shape).reshape(-1) for a in arrays], shape
-
-
-def parts_of_rows(rows: Mapping[str, Floats], most: int) -> Iterator[Mapping[str, Floats]]:
-    """Consecutive parts of at most `most` rows; one part without a row where there are none."""
-    count = len(next(iter(rows.values())))
-    if count <= most:
-        yield rows
-        return
-    for first in range(0, count, most):
-        yield {name: values[first : first + most] for name, values in rows.items()}
 
 
 def without_copies(rows: Mapping[str, Floats], readings: Sequence[str]) -> dict[str, Floats]:

@@ -3,7 +3,7 @@
 The rule depends on the correlation of the errors. Estimates from different sensors or times have
 independent errors: inverse-variance weights are optimal. Regressors of the same measurement have
 correlated errors (0.8 and more): inverse-variance weights then understate the variance by far, and
-a rule that uses the correlation, or holds for any, is needed.
+a rule that uses the correlation is needed.
 
 All rules take `mean` and `std` of shape (m, ...) for m estimators and return a `FusedEstimate`.
 They raise `InputError` for a standard deviation that is not positive.
@@ -11,7 +11,6 @@ They raise `InputError` for a standard deviation that is not positive.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -32,15 +31,12 @@ class FusedEstimate:
     weights: Floats
 
 
-def inverse_variance(mean: Floats, std: Floats, correlation: Floats | None = None) -> FusedEstimate:
+def inverse_variance(mean: Floats, std: Floats) -> FusedEstimate:
     r"""Inverse-variance weights, optimal for independent errors.
 
     .. math:: w_i = \sigma_i^{-2} / \sum_j \sigma_j^{-2}, \quad \sigma^2 = 1 / \sum_j \sigma_j^{-2}
 
     Not for correlated errors, whose variance it understates.
-
-    mean, std: Estimates and standard deviations (m, ...).
-    correlation: Not used.
 
     References: Comin and Saaj 2017, eq. 26, for two.
     """
@@ -50,7 +46,7 @@ def inverse_variance(mean: Floats, std: Floats, correlation: Floats | None = Non
     return FusedEstimate((weights * mean).sum(axis=0), information.sum(axis=0) ** -0.5, weights)
 
 
-def pairwise(mean: Floats, std: Floats, correlation: Floats | None = None) -> FusedEstimate:
+def pairwise(mean: Floats, std: Floats) -> FusedEstimate:
     r"""Mean of the two-sensor weights over all pairs.
 
     .. math:: w_i = \frac{2}{m (m-1)} \sum_{j \ne i} \frac{\sigma_j^2}{\sigma_i^2 + \sigma_j^2}
@@ -61,17 +57,11 @@ def pairwise(mean: Floats, std: Floats, correlation: Floats | None = None) -> Fu
     References: Comin and Saaj 2017, eq. 30, for three.
     """
     _check(std)
-    m = len(mean)
-    variance = std**2
-    weights = np.zeros_like(std)
-    for i in range(m):
-        for j in range(m):
-            if j != i:
-                weights[i] += variance[j] / (variance[i] + variance[j])
-    weights *= 2.0 / (m * (m - 1))
-    return FusedEstimate(
-        (weights * mean).sum(axis=0), np.sqrt((weights**2 * variance).sum(axis=0)), weights
-    )
+    m, variance = len(mean), std**2
+    shares = variance / (variance[:, None] + variance)  # (i, j, ...); 1/2 with itself
+    weights = (shares.sum(axis=1) - 0.5) * 2.0 / (m * (m - 1))
+    fused = np.sqrt((weights**2 * variance).sum(axis=0))
+    return FusedEstimate((weights * mean).sum(axis=0), fused, weights)
 
 
 def best_linear(mean: Floats, std: Floats, correlation: Floats | None = None) -> FusedEstimate:
@@ -94,7 +84,8 @@ def best_linear(mean: Floats, std: Floats, correlation: Floats | None = None) ->
     R = np.eye(m) if correlation is None else correlation
     best_variance = np.full(std.shape[1:], np.inf)
     best_weights = np.zeros_like(std)
-    for subset in _subsets(m):
+    subsets = (c for size in range(1, m + 1) for c in combinations(range(m), size))
+    for subset in subsets:
         inverse = np.linalg.inv(R[np.ix_(subset, subset)] + RIDGE * np.eye(len(subset)))
         scaled = np.zeros_like(std)
         for i, row in zip(subset, inverse, strict=True):
@@ -104,29 +95,6 @@ def best_linear(mean: Floats, std: Floats, correlation: Floats | None = None) ->
         best_variance = np.where(better, variance, best_variance)
         best_weights = np.where(better, scaled * variance, best_weights)
     return FusedEstimate((best_weights * mean).sum(axis=0), np.sqrt(best_variance), best_weights)
-
-
-def _subsets(m: int) -> list[tuple[int, ...]]:
-    """Every non-empty subset of m estimators."""
-    return [chosen for size in range(1, m + 1) for chosen in combinations(range(m), size)]
-
-
-def covariance_intersection(
-    mean: Floats, std: Floats, correlation: Floats | None = None
-) -> FusedEstimate:
-    r"""Covariance intersection with equal weights: consistent for any correlation of the errors.
-
-    .. math:: \sigma^{-2} = \frac{1}{m} \sum_i \sigma_i^{-2}, \quad
-        w_i = \sigma_i^{-2} / \sum_j \sigma_j^{-2}
-
-    Conservative: for independent errors the variance is m times the optimal one.
-
-    References: Julier and Uhlmann, Proc. American Control Conference, 1997, with omega = 1/m.
-    """
-    _check(std)
-    information = std**-2.0
-    weights = information / information.sum(axis=0)
-    return FusedEstimate((weights * mean).sum(axis=0), information.mean(axis=0) ** -0.5, weights)
 
 
 def _check(std: Floats) -> None:
@@ -146,17 +114,3 @@ def shrink_correlation(correlation: Floats, share: float = 0.1) -> Floats:
     mean = (correlation.sum() - m) / (m * (m - 1))
     target = np.full((m, m), mean) + (1.0 - mean) * np.eye(m)
     return np.asarray((1.0 - share) * correlation + share * target)
-
-
-#: Name of the rule for regressors of the same measurement, whose correlation is known.
-BEST_LINEAR = "best-linear"
-#: Name of the rule for errors of unknown correlation.
-COVARIANCE_INTERSECTION = "covariance-intersection"
-
-#: Rules by their names in a training specification.
-RULES: dict[str, Callable[..., FusedEstimate]] = {
-    BEST_LINEAR: best_linear,
-    COVARIANCE_INTERSECTION: covariance_intersection,
-    "inverse-variance": inverse_variance,
-    "pairwise": pairwise,
-}

@@ -17,9 +17,6 @@ from soilml.onboard.set_contract import Floats
 #: readings, and by number of readings.
 WHOLE, SINGLE = ("rows", "repeats"), ("truth", "mean", "std")
 KEYS = (*WHOLE, *SINGLE, "repeat_std", "repeat_coverage_factor")
-#: Keys of both entries that earlier versions read as well; they are empty.
-FORMER = tuple(f"average_{key}" for key in ("rows", *SINGLE))
-FORMER_TOGETHER = ("over", "lower", "upper", "std", "kinds", "doubt")
 
 
 @dataclass(frozen=True)
@@ -69,7 +66,7 @@ class HeldOutErrors:
 
     def entry(self) -> dict[str, Any]:
         """The metadata entry, with four significant digits."""
-        found: dict[str, Any] = {key: [] for key in FORMER}
+        found: dict[str, Any] = {}
         for key in KEYS:
             values = getattr(self, key)
             rounded = [float(f"{v:.4g}") for v in values.ravel()]
@@ -107,6 +104,5 @@ class HeldOutErrors:
 
 def together(factor: Floats, errors: HeldOutErrors | None = None) -> dict[str, Any]:
     """The metadata entry "together": half-width (q,) of intervals of single rows, and errors."""
-    found: dict[str, Any] = {key: [] for key in FORMER_TOGETHER}
     own = {} if errors is None else {"held_out": errors.entry()}
-    return found | {"alone": factor.tolist()} | own
+    return {"alone": factor.tolist(), **own}

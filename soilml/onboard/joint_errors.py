@@ -188,23 +188,12 @@ def _positive(correlation: Floats) -> Floats:
     return np.asarray(repaired / np.outer(size, size))
 
 
-@dataclass(frozen=True)
-class FusedRows:
-    """Mean, standard deviation, ends of the 90 % interval, and disagreement, each (n, q).
-
-    The disagreement is the largest difference between two files, in standard deviations of that
-    difference; 0 for readings of one file.
-    """
-
-    mean: Floats
-    std: Floats
-    low: Floats
-    high: Floats
-    disagreement: Floats
-
-
-def fuse_rows(mean: Floats, std: Floats, files: Sequence[HeldOutErrors]) -> FusedRows:
+def fuse_rows(mean: Floats, std: Floats, files: Sequence[HeldOutErrors]) -> list[Floats]:
     """Fuse m readings by variance and the correlation of their errors.
+
+    Returns mean, standard deviation, ends of the 90 % interval, and disagreement, each (n, q). The
+    disagreement is the largest difference between two files, in standard deviations of that
+    difference; 0 for readings of one file.
 
     Readings of the same file are averaged first: what they have in common of their error, which
     the file carries, does not average out. The averages of different files are then fused by
@@ -224,7 +213,7 @@ def fuse_rows(mean: Floats, std: Floats, files: Sequence[HeldOutErrors]) -> Fuse
     stds = np.stack([std[m].mean(axis=0) for m in members]) * ratio[:, None, :]
     if len(distinct) == 1:
         half = repeated[0][1] * stds[0]
-        return FusedRows(means[0], stds[0], means[0] - half, means[0] + half, 0.0 * half)
+        return [means[0], stds[0], means[0] - half, means[0] + half, 0.0 * half]
     rules = joint_errors(distinct)
     if rules is None:
         raise ValueError("the files have too few held-out rows in common")
@@ -232,4 +221,4 @@ def fuse_rows(mean: Floats, std: Floats, files: Sequence[HeldOutErrors]) -> Fuse
     for k, rule in enumerate(rules):
         fused, spread, disagreement = rule.fuse(means[..., k], stds[..., k], ratio[:, k])
         columns.append((fused, spread, *rule.interval(fused, spread), disagreement))
-    return FusedRows(*(np.stack(column, axis=-1) for column in zip(*columns, strict=True)))
+    return [np.stack(column, axis=-1) for column in zip(*columns, strict=True)]

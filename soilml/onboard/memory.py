@@ -20,7 +20,7 @@ Singles = NDArray[np.float32]
 
 #: Rows fed to the graph at a time: bounds its working memory, whatever the length of a run.
 ROWS_PER_CALL = 256
-MEMORY_FORMAT = "2"  # Version of the content of a memory; those of version 1 have no checksum
+MEMORY_FORMAT = "3"  # Version of the content of a memory
 #: A memory is packed each time that it has grown by so many rows, so that a step takes about as
 #: long after thousands of readings as after a few.
 PACKED_EVERY = 32
@@ -30,13 +30,14 @@ LEAST_SINGULAR_VALUE = 1e-3
 
 
 def memory_identity(metadata: Mapping[str, str], context: Mapping[str, float]) -> str:
-    """Identity of the memories of a file for what holds for a whole set.
+    """Identity of the memories of a file: version of the content, and what holds for a whole set.
 
-    That is wheel, bearing and prior, and the errors that all rows share, which are part of the
-    rows in the memory.
+    The latter is wheel, bearing and prior, and the errors that all rows share.
     """
     values = json.dumps(sorted(context.items())).encode()
-    return f"{metadata['graph_sha256'][:16]}-{hashlib.sha256(values).hexdigest()[:8]}"
+    return (
+        f"{MEMORY_FORMAT}-{metadata['graph_sha256'][:16]}-{hashlib.sha256(values).hexdigest()[:8]}"
+    )
 
 
 @final
@@ -53,8 +54,6 @@ class Memory:
         Informative readings, rows, and rows in range, (3,).
     file : str
         Which file, wheel and prior the memory is of: `Estimator.memory_id`.
-    format : str
-        Version of the content.
     checksum : int
         Of all that, as `Estimator.start` and `Estimator.step` wrote it. A memory whose content has
         changed since is refused.
@@ -63,7 +62,6 @@ class Memory:
     system: Floats
     counts: Singles
     file: str = ""
-    format: str = MEMORY_FORMAT
     checksum: int = 0
 
     def sealed(self) -> Memory:
@@ -76,7 +74,7 @@ class Memory:
         return self.checksum == state_checksum(*self._parts())
 
     def _parts(self) -> Iterator[object]:
-        yield from (self.format, self.file)
+        yield self.file
         yield from (np.asarray(self.system, np.float64), np.asarray(self.counts, np.float32))
 
     @property
@@ -124,15 +122,10 @@ def check_memory(memory: object, columns: int, identity: str, path: str) -> Memo
     begin = "begin with estimator.start()"
     if not isinstance(memory, Memory):
         raise InputError(f"memory is a {type(memory).__name__}; needed is a Memory: {begin}")
-    if memory.format != MEMORY_FORMAT:
-        raise InputError(
-            f"this memory has format {memory.format!r}; this version of soilml reads format "
-            f"{MEMORY_FORMAT!r}: {begin}"
-        )
     if memory.file != identity:
         raise InputError(
-            f"this memory is of {memory.file!r}, which is another file, wheel, prior or error of "
-            f"sensors than {identity!r} of {path}: {begin}"
+            f"this memory is of {memory.file!r}, which is another file, version, wheel, prior or "
+            f"error of sensors than {identity!r} of {path}: {begin}"
         )
     system, counts = (as_numbers("memory", part) for part in (memory.system, memory.counts))
     finite = bool(np.isfinite(system).all() and np.isfinite(counts).all())

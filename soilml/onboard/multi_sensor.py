@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
-from soilml.onboard.fusion_rules import BEST_LINEAR, RULES
+from soilml.onboard.fusion_rules import inverse_variance
 from soilml.onboard.gaussian_product import gaussian_product
 from soilml.onboard.joint_errors import are_comparable, fuse_rows
 from soilml.onboard.set_contract import Floats
@@ -21,9 +21,8 @@ from soilml.quantities import Z_90
 CORRELATED = "correlated"
 #: Fusion of estimates with independent errors and a common prior, which is counted once.
 PRIOR_ONCE = "prior-once"
-#: Rules by which estimates of different files can be fused; `best-linear` has one set of weights
-#: for all rows, and is for regressors of one file.
-ACROSS_FILES = (CORRELATED, PRIOR_ONCE, *(rule for rule in RULES if rule != BEST_LINEAR))
+#: Rules by which estimates of different files can be fused; the last is that of a source paper.
+ACROSS_FILES = (CORRELATED, PRIOR_ONCE, "inverse-variance")
 #: Estimates further apart than this are contradictory, in standard deviations of the difference.
 CONTRADICTION = 4.0
 #: Priors that differ by less than this share of their standard deviation count as the same.
@@ -80,10 +79,8 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str | None = None) -> Mu
         .. math:: P^{-1} = P_0^{-1} + \sum_i (P_i^{-1} - P_0^{-1}),
 
         is exact for Gaussian estimates whose errors are independent. `inverse-variance` (Comin and
-        Saaj 2017, eq. 26) and `pairwise` (eq. 30) count the prior in every estimate: they are
-        overconfident unless the readings are far more informative than the prior.
-        `covariance-intersection` is conservative whatever the correlation of the errors, for
-        example through a soil outside the prior of every file.
+        Saaj 2017, eq. 26) counts the prior in every estimate: it is overconfident unless the
+        readings are far more informative than the prior.
 
     Returns
     -------
@@ -98,7 +95,9 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str | None = None) -> Mu
         for the rule `correlated` where the correlation is not known.
     """
     if rule is not None and rule not in ACROSS_FILES:
-        raise InputError(f"rule is {rule!r}; for estimates of several files: {_join(ACROSS_FILES)}")
+        raise InputError(
+            f"rule is {rule!r}; for estimates of several files: {', '.join(ACROSS_FILES)}"
+        )
     _check_compatible(estimates)
     known = are_comparable([e.errors for e in estimates])
     if rule == CORRELATED and not known:
@@ -166,9 +165,10 @@ def _fuse_by_correlation(
     mean: Floats, covariance: Floats, files: Sequence[Any]
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """Mean, covariance, ends of the interval, and disagreement (n,), of estimates (m, n, ...)."""
-    found = fuse_rows(mean, np.sqrt(np.diagonal(covariance, axis1=2, axis2=3)), files)
-    fused = _mean_correlation(covariance) * found.std[:, :, None] * found.std[:, None, :]
-    return found.mean, fused, found.low, found.high, found.disagreement.max(axis=-1)
+    stds = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3))
+    centre, std, low, high, disagreement = fuse_rows(mean, stds, files)
+    fused = _mean_correlation(covariance) * std[:, :, None] * std[:, None, :]
+    return centre, fused, low, high, disagreement.max(axis=-1)
 
 
 def _fuse_by_variance(
@@ -179,7 +179,7 @@ def _fuse_by_variance(
         by_row = np.moveaxis(mean, 0, 1), np.moveaxis(covariance, 0, 1)
         centre, fused = gaussian_product(*by_row, prior)
     else:
-        found = RULES[rule](mean, np.sqrt(np.diagonal(covariance, axis1=2, axis2=3)))
+        found = inverse_variance(mean, np.sqrt(np.diagonal(covariance, axis1=2, axis2=3)))
         centre, std = found.mean, found.std
         fused = _mean_correlation(covariance) * std[:, :, None] * std[:, None, :]
     half = Z_90 * np.sqrt(np.diagonal(fused, axis1=1, axis2=2))
@@ -213,8 +213,8 @@ def _check_compatible(estimates: Sequence[Estimate]) -> None:
     for other in estimates[1:]:
         if other.names != first.names:
             raise InputError(
-                f"one file estimates {_join(first.names)}, another {_join(other.names)}: only "
-                "estimates of the same quantities, in the same order, can be fused"
+                f"one file estimates {', '.join(first.names)}, another {', '.join(other.names)}: "
+                "only estimates of the same quantities, in the same order, can be fused"
             )
         if other.in_range.shape != first.in_range.shape:
             raise InputError(
@@ -232,7 +232,7 @@ def _check_compatible(estimates: Sequence[Estimate]) -> None:
             own, its = getattr(first.prior, key), getattr(other.prior, key)
             if (np.abs(own - its) > SAME_PRIOR * first.prior.std).any():
                 raise InputError(
-                    f"the files have different priors of {_join(first.names)}: "
+                    f"the files have different priors of {', '.join(first.names)}: "
                     f"{_format_range(first.prior)} and {_format_range(other.prior)}; train both "
                     "from one recipe"
                 )
@@ -241,7 +241,3 @@ def _check_compatible(estimates: Sequence[Estimate]) -> None:
 def _format_range(prior: PriorSummary) -> str:
     lower, upper = (", ".join(f"{v:g}" for v in end) for end in (prior.lower, prior.upper))
     return f"from {lower} to {upper}"
-
-
-def _join(words: Sequence[str]) -> str:
-    return ", ".join(words)

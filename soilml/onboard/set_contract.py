@@ -27,48 +27,34 @@ READING_INPUTS = ("slip", "load", "torque", "sinkage", "drawbar_pull")
 #: Standard deviations of a row in the order of the graph's inputs: noise of the three channels, and
 #: the bias of the torque sensor, which all rows share.
 STD_INPUTS = ("torque_std", "torque_bias", "sinkage_std", "drawbar_pull_std")
-#: Standard deviations of a row's slip and load, zero where they are exact. Files of earlier
-#: versions lack these inputs.
+#: Standard deviations of a row's slip and load, zero where they are exact.
 OPERATING_STD_INPUTS = ("slip_std", "load_std")
 OPERATING_NOISE = ("slip", "load")  # Names under which that noise is declared
 #: Standard deviations of errors of the sensors that all rows of a set share: offset of slip,
 #: relative errors of load and torque, offsets of sinkage and drawbar pull.
 SENSOR_ERROR_INPUTS = ("slip_bias", "load_gain", "torque_gain", "sinkage_bias", "drawbar_pull_bias")
 #: Size of the errors of the model, as a multiple of their usual size; 0: the model is right; below
-#: zero, which is the default: inferred from the readings. Files of interface 2 and earlier lack it;
-#: those of interfaces 3 and 4 infer nothing.
+#: zero, which is the default: inferred from the readings.
 MODEL_ERROR_INPUT = "model_error"
 INFERRED = -1.0
 COMMON_ERROR_INPUTS = (*SENSOR_ERROR_INPUTS, MODEL_ERROR_INPUT)  # All errors that a set shares
 #: Errors of the sensors that all rows share, in the order of their columns of the residual system,
-#: after those of the monomials. Files without `COMMON_ERROR_INPUTS` have the first only.
+#: after those of the monomials.
 SENSOR_ERROR_COLUMNS = (
-    "torque_bias",
-    "sinkage_bias",
-    "drawbar_pull_bias",
-    "torque_gain",
-    "slip_bias",
-    "load_gain",
+    *("torque_bias", "sinkage_bias", "drawbar_pull_bias"),
+    *("torque_gain", "slip_bias", "load_gain"),
 )
-#: Errors of the laws of the soil, the last columns, which files of interface 4 lack: logarithm of
-#: the strength, its change with the logarithm of load, and logarithm of the shear modulus. No
-#: reading tells them from other values of the parameters.
+#: Errors of the laws of the soil, the last columns: logarithm of the strength, its change with the
+#: logarithm of load, and logarithm of the shear modulus. No reading tells them from other values of
+#: the parameters.
 LAW_ERROR_COLUMNS = ("strength", "strength_by_load", "shear_modulus")
 #: Errors of the model, in the order of their columns, after those of the sensors: logarithm of the
 #: bearing modulus, its changes with slip and with the logarithm of load, contact behind the axle
 #: as a multiple of `exit-angle` at its usual size, logarithm of sinkage, drawbar pull over load;
-#: changes with slip of the logarithms of torque and sinkage, and of drawbar pull over load, which
-#: files of interface 3 lack.
+#: changes with slip of the logarithms of torque and sinkage, and of drawbar pull over load.
 MODEL_ERROR_COLUMNS = (
-    "bearing",
-    "bearing_by_slip",
-    "bearing_by_load",
-    "contact",
-    "sinkage",
-    "drawbar_pull",
-    "torque_by_slip",
-    "sinkage_by_slip",
-    "drawbar_pull_by_slip",
+    *("bearing", "bearing_by_slip", "bearing_by_load", "contact", "sinkage", "drawbar_pull"),
+    *("torque_by_slip", "sinkage_by_slip", "drawbar_pull_by_slip"),
     *LAW_ERROR_COLUMNS,
 )
 ERROR_COLUMNS = (*SENSOR_ERROR_COLUMNS, *MODEL_ERROR_COLUMNS)  # All columns of errors
@@ -98,7 +84,7 @@ ABSENT_STD = 1e6
 NOT_MEASURED = -1e30
 NOISE_OF_FILE = -1.0
 #: A set is estimated if at least this share of its rows is in range; the others are set aside.
-#: Files of interface 4 and earlier, whose metadata do not state it, refuse more sets.
+#: Files of interface 4 and earlier do not state it.
 LEAST_SHARE_IN_RANGE, FORMER_SHARE_IN_RANGE = 0.5, 0.9
 #: Counts in the place of a memory that is not finite: so many rows out of range that every further
 #: set is refused.

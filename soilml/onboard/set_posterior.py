@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
-from soilml.onboard.features import READABLE, as_number, as_numbers, flatten_readings, parts_of_rows
+from soilml.onboard.features import READABLE, as_number, as_numbers, flatten_readings
 from soilml.onboard.memory import ROWS_PER_CALL, Memory
 from soilml.onboard.model_file import Session
 from soilml.onboard.set_contract import (
@@ -34,7 +34,6 @@ from soilml.onboard.set_contract import (
     OPERATING_STD_INPUTS,
     OPTIONAL_READINGS,
     REQUIRED_READINGS,
-    ROW_IN_RANGE,
     SENSOR_ERROR_COLUMNS,
     SET_OUTPUTS,
     SET_PREFIX,
@@ -67,8 +66,9 @@ class SetPosterior:
     context_ranges: Least and largest value of each context input, which holds for a whole set.
     context_values: Values of the context inputs that were set.
     sets_only: Whether the file has no regressors of single rows.
-    common_errors: Standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`; none
-        in a file of an earlier version. They have `error_columns` columns in the residual system.
+    common_errors: Standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`, as
+        far as the file knows them: those of earlier interfaces know fewer, or none.
+    error_columns: Columns of errors in the residual system.
     least_share_in_range: Share of a set's rows that must be in range; the others are set aside.
     log_torque: Whether the graph takes the logarithm of torque: where the noise of torque has no
         constant part, and in a file for any wheel.
@@ -82,9 +82,9 @@ class SetPosterior:
     context_ranges: dict[str, tuple[float, float]]
     context_values: dict[str, float]
     sets_only: bool
-    common_errors: dict[str, float] = field(default_factory=dict)
-    error_columns: int = 1
-    least_share_in_range: float = FORMER_SHARE_IN_RANGE
+    common_errors: dict[str, float]
+    error_columns: int
+    least_share_in_range: float
     log_torque: bool = True
     constant_noise: float = 0.0
     misfit_limits: Mapping[str, Any] = field(default_factory=dict)
@@ -92,7 +92,7 @@ class SetPosterior:
     @staticmethod
     def of(metadata: Mapping[str, Any]) -> SetPosterior:
         """From the entry `set` of a file's metadata."""
-        context = metadata["context"].items()
+        context, errors = metadata["context"].items(), metadata.get("errors", {})
         noise = {str(k): (float(v[0]), float(v[1])) for k, v in metadata["noise"].items()}
         constant, _ = noise.get("torque", (0.0, 0.0))
         return SetPosterior(
@@ -100,9 +100,11 @@ class SetPosterior:
             noise=noise,
             context_ranges={str(k): (float(v[0]), float(v[1])) for k, v in context},
             context_values={},
-            common_errors=read_common_errors(metadata),
-            error_columns=error_columns(metadata),
             sets_only=bool(metadata["alone"]),
+            common_errors={n: float(errors[n]) for n in COMMON_ERROR_INPUTS if n in errors},
+            error_columns=len(SENSOR_ERROR_COLUMNS) + len(metadata.get("model_errors", ()))
+            if errors
+            else 1,
             least_share_in_range=float(metadata.get("least_share_in_range", FORMER_SHARE_IN_RANGE)),
             log_torque=metadata.get("kind") == "any wheel" or not constant,
             misfit_limits=metadata.get("misfit", {}),
@@ -124,11 +126,15 @@ class SetPosterior:
         Raises `InputError` if a name is not known, or a value is out of the range of the file.
         """
         parts = {name: _noise_parts(name, value) for name, value in _items("noise", noise)}
-        for name in OPERATING_NOISE:
-            check_takes_errors(self.common_errors, name, sum(parts.get(name, ())))
         values = {name: as_number(name, value) for name, value in context.items()}
-        common = with_common_errors(self.common_errors, values)
-        values = {name: v for name, v in values.items() if name not in COMMON_ERROR_INPUTS}
+        common = {name: values.pop(name) for name in COMMON_ERROR_INPUTS if name in values}
+        for name, value in common.items():
+            self._check_knows(name, value)
+            inferred = name == MODEL_ERROR_INPUT and value == INFERRED
+            if not (0.0 <= value < np.inf or inferred):
+                raise InputError(
+                    f"{name} is {value:g}; needed is a standard deviation, zero or more"
+                )
         for name, value in values.items():
             if name not in self.context_ranges:
                 known = ", ".join(self.context_ranges) or "none: it was trained for one wheel"
@@ -146,9 +152,18 @@ class SetPosterior:
             self,
             context_values=values,
             noise=self.noise | parts,
-            common_errors=common,
+            common_errors={n: common.get(n, v) for n, v in self.common_errors.items()},
             constant_noise=constant if self.log_torque else 0.0,
         )
+
+    def _check_knows(self, name: str, std: float) -> None:
+        """Raise `InputError` for an error that a file of an earlier interface takes as zero."""
+        of_model = name == MODEL_ERROR_INPUT and name not in self.common_errors
+        if (of_model or not self.common_errors) and std != 0.0:
+            raise InputError(
+                f"{name} is {std:g}, but this file of an earlier version takes it as zero: train "
+                "it again, with [set_posterior]"
+            )
 
     def start(self, file: str = "") -> Memory:
         """The memory before the first reading, of the file with this identity."""
@@ -184,10 +199,9 @@ class SetPosterior:
             rows[name] = self._std(name, source, rows["torque"], measured, shape)
         for name, source in zip(OPERATING_STD_INPUTS, OPERATING_NOISE, strict=True):
             std = self._std(name, source, rows[source], measured, shape)
+            self._check_knows(name, float(std.max(initial=0.0)))
             if self.common_errors:
                 rows[name] = std
-            else:
-                check_takes_errors(self.common_errors, name, float(std.max(initial=0.0)))
         if self.constant_noise and "torque_std" not in measured:
             factor = constant_noise_factor(rows["torque"], self.constant_noise)
             rows |= {name: rows[name] * factor for name in ("torque", "torque_std")}
@@ -239,13 +253,6 @@ class SetPosterior:
         feed: Feed = {name: np.asarray([value], np.float32) for name, value in of_set.items()}
         return feed if self.sets_only else feed | {SET_SWITCH: np.ones(1, np.bool_)}
 
-    def rows_in_range(self, session: Session, rows: Mapping[str, Floats]) -> NDArray[np.bool_]:
-        """Which rows (m,) lie in the range of the response surface."""
-        none = self.start()
-        parts = parts_of_rows(rows, ROWS_PER_CALL)
-        flags = [session.run((ROW_IN_RANGE,), self.feed(part, none))[0] for part in parts]
-        return np.concatenate(flags)
-
     def update(
         self, session: Session, rows: Mapping[str, Floats], memory: Memory
     ) -> tuple[list[Any], Memory]:
@@ -253,7 +260,11 @@ class SetPosterior:
 
         The memory is not packed.
         """
-        *parts, last = parts_of_rows(rows, ROWS_PER_CALL)
+        count = len(next(iter(rows.values())))
+        *parts, last = (
+            {name: values[first : first + ROWS_PER_CALL] for name, values in rows.items()}
+            for first in range(0, max(count, 1), ROWS_PER_CALL)
+        )
         for part in parts:
             memory = memory.grown(*session.run(MEMORY_OUTPUTS, self.feed(part, memory))).packed()
         memory = memory.packed()
@@ -307,53 +318,6 @@ def _broadcast(name: str, value: Any, shape: tuple[int, ...]) -> Floats:
         if bad.any():
             raise InputError(f"{name} is {array[bad][0]:g}; needed is a finite number, or NaN")
     return array
-
-
-def read_common_errors(metadata: Mapping[str, Any]) -> dict[str, float]:
-    """The usual errors from the entry `set` of a file's metadata; none in earlier versions."""
-    if "errors" not in metadata:
-        return {}
-    errors = metadata["errors"]
-    return {name: float(errors[name]) for name in COMMON_ERROR_INPUTS if name in errors}
-
-
-def error_columns(metadata: Mapping[str, Any]) -> int:
-    """Columns of errors in a file's residual system, from the entry `set` of its metadata.
-
-    Files of earlier versions know fewer errors.
-    """
-    if "errors" not in metadata:
-        return 1
-    return len(SENSOR_ERROR_COLUMNS) + len(metadata.get("model_errors", ()))
-
-
-def with_common_errors(usual: Mapping[str, float], given: Mapping[str, Any]) -> dict[str, float]:
-    """The errors that a file assumes, with those among the given values that a user sets.
-
-    Raises `InputError` if a value is negative or not finite, or if the file takes what has this
-    error as exact.
-    """
-    own = {name: float(given[name]) for name in COMMON_ERROR_INPUTS if name in given}
-    for name, value in own.items():
-        inferred = name == MODEL_ERROR_INPUT and value == usual.get(name) == INFERRED
-        if not (0.0 <= value < np.inf or inferred):
-            raise InputError(f"{name} is {value:g}; needed is a standard deviation, zero or more")
-        check_takes_errors(usual, name, value)
-    return {name: own.get(name, value) for name, value in usual.items()}
-
-
-def check_takes_errors(usual: Mapping[str, float], name: str, std: float) -> None:
-    """Raise `InputError` for an error that a file of an earlier version takes no account of."""
-    if name == MODEL_ERROR_INPUT and name not in usual and std > 0.0:
-        raise InputError(
-            f"{name} is {std:g}, but this file assumes a perfect model; train it again, with "
-            "[set_posterior], to have errors of the model taken into account"
-        )
-    if not usual and std > 0.0:
-        raise InputError(
-            f"{name} is {std:g}, but this file takes slip, load and the scale of torque as exact; "
-            "train it again, with [set_posterior], to have their errors taken into account"
-        )
 
 
 def estimate_of_set(

@@ -15,7 +15,6 @@ from soilml.io.read_table import Rows, as_table
 from soilml.io.table import ALL, Table
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import ROWS_PER_CALL, Estimator
-from soilml.onboard.fusion_rules import COVARIANCE_INTERSECTION
 from soilml.onboard.set_contract import (
     INFERRED,
     MODEL_ERROR_INPUT,
@@ -157,7 +156,7 @@ def check_independent(estimators: Sequence[Estimator]) -> None:
             names = ", ".join(column(name) for name in first.inputs if name in shared)
             raise InputError(
                 f"{first.path} and {second.path} both read {names}: their errors are not "
-                f"independent; use one of them, or --rule {COVARIANCE_INTERSECTION}"
+                "independent; use one of them"
             )
 
 

@@ -41,7 +41,7 @@ def test_generated_rows_are_the_model_its_mean_and_the_error(recipe):
     bare = simulate_rows(replace(exact, case=replace(exact.case, remainder=None)), 0, 0, 64)
     mean, _ = recipe.case.remainder.mean_and_std("torque", sampled.slip, sampled.load)
     added = rows["torque_Nm"] - bare["torque_Nm"]
-    error = model_error(recipe, 0, sampled)["torque_Nm"]
+    error = model_error(recipe, 0, sampled, sampled.run)["torque_Nm"]
     np.testing.assert_allclose(added, mean + error, rtol=1e-9, atol=1e-12)
     assert np.std(error) > 0.05
     np.testing.assert_array_equal(rows["sinkage_m"], bare["sinkage_m"])

@@ -36,7 +36,7 @@ def test_a_smooth_error_has_the_usual_size_and_is_shared_by_a_run(tmp_path):
     of = recipe(tmp_path, "[worlds]\neffect = 0.0\nerror = 1.0\n")
     plain, found = torque(recipe(tmp_path)), torque(of)
     error = (found - plain).reshape(-1, 16)
-    amplitude = of.worlds.amplitudes["torque_Nm"][0]
+    amplitude = of.worlds.amplitudes["torque_Nm"].constant
     assert np.std(error) == pytest.approx(amplitude, rel=0.15)
     assert np.mean(error, axis=1).std() > 0.6 * amplitude  # noise would leave a quarter
 

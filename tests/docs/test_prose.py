@@ -27,7 +27,7 @@ HOUSE_WORDS = re.compile(
     re.IGNORECASE,
 )
 #: Texts that trained files have in their cards, which a training writes.
-WRITTEN = ("training/export/any_wheel_file.py", "training/export/model_card.py")
+WRITTEN = ("training/export/model_card.py",)
 
 
 def name_of(page):

@@ -38,7 +38,6 @@ def leg_scores(tmp_path_factory):
     def of(data, targets, *read):
         names = list(dict.fromkeys(name for names in read for name in names.split()))
         text = f"features = {json.dumps(names)}\ntargets = {json.dumps(targets)}\n"
-        text += 'rule = "inverse-variance"\n'
         text += "".join(f"{MACHINE}features = {json.dumps(names.split())}\n" for names in read)
         (folder / "s.toml").write_text(text)
         spec = read_spec(folder / "s.toml")
@@ -52,9 +51,9 @@ def leg_scores(tmp_path_factory):
 
 @pytest.mark.slow
 def test_on_known_soil_torque_and_vibration_joined_say_more_of_slip_than_one(leg_scores):
-    """Comin and Saaj 2017, eq. 26."""
+    """Comin and Saaj 2017, section IV-A, with the weights of the correlation of the errors."""
     (shares,) = leg_scores("known", ["slip"], "torque/load load", "vibration load")
-    assert shares[-1] < 0.75 * shares[:2].min() < shares[:2].max() < 0.6
+    assert shares[-1] < 0.85 * shares[:2].min() < shares[:2].max() < 0.6
 
 
 @pytest.mark.slow

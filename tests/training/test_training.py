@@ -40,14 +40,10 @@ def test_every_row_trains_and_is_estimated_by_a_fit_that_has_not_seen_its_run(da
     assert (other.mean[~out] != left.mean[~out]).any()
 
 
-def test_train_writes_model_card_and_picture(small_model):
-    from matplotlib.image import imread
-
+def test_train_writes_the_model_card(small_model):
     card = small_model.with_suffix(".md").read_text()
-    for text in ("cohesion", "in_range", "sha256", "best-linear", "90 %", "mostly the prior"):
+    for text in ("cohesion", "in_range", "sha256", "90 %", "mostly the prior"):
         assert text in card
-    picture = imread(small_model.with_suffix(".png"))
-    assert picture.shape[0] > 200 and picture[..., :3].std() > 0.01
 
 
 def test_the_exported_intervals_hold_on_data_of_another_seed(small_model, tmp_path):
@@ -75,12 +71,11 @@ def test_the_exported_intervals_hold_on_data_of_another_seed(small_model, tmp_pa
     ("text", "message"),
     [
         ("", "regressor]] is missing"),
-        ('[[regressor]]\ntype = "forest"\n', "lssvm, fixed-size-lssvm, mlp, linear"),
+        ('[[regressor]]\ntype = "forest"\n', "fixed-size-lssvm, mlp, linear, lssvm"),
         ('[[regressor]]\ntype = "mlp"\nlayers = [3]\n', "unknown key 'layers'"),
         ('[[regressor]]\ntype = "mlp"\nhidden = [0]\n', "whole numbers from 1 to 4096"),
         ('[[regressor]]\ntype = "mlp"\nepochs = 0\n', "1 or more"),
         ('[[regressor]]\ntype = "lssvm"\ngamma = -1.0\n', "above zero"),
-        ('rule = "average"\n[[regressor]]\ntype = "mlp"\n', "rule is 'average'"),
         ('features = ["slip", "colour"]\n[[regressor]]\ntype = "mlp"\n', "'colour' is none of"),
         ('targets = ["depth"]\n[[regressor]]\ntype = "mlp"\n', "'depth' cannot be estimated"),
     ],

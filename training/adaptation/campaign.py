@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,11 +15,9 @@ from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.fitting.readings import stack_readings, typical_std
 from soilml.gap.checks import estimate_repeat_noise
-from soilml.gap.evidence.holdout_split import RUNS_PER_HELD_OUT, split_holdout
+from soilml.gap.held_out import RUNS_PER_HELD_OUT, split_holdout
 from soilml.io.table import Table
-from soilml.physics.effects import Effect
 from soilml.physics.gears.emulated import EmulatedGear
-from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import SHEAR, column
 from soilml.remarks import Remark
 from training.set_posterior.families.recipe_family import MOST_UNKNOWNS, RecipeFamily
@@ -38,34 +35,17 @@ CARRIED_CONDITIONS = 0.75
 #: Slips that a file can be trained on.
 LEAST_SLIP, MOST_SLIP = 0.01, 0.95
 #: Runs of synthetic rows: their length, share and what is steady in them, as in the recipe `wheel`.
-RUNS = """\
-[[runs]]
-rows = 1
-share = 0.52
-
-[[runs]]
-rows = 32
-share = 0.14
-
-[[runs]]
-rows = 8
-share = 0.06
-
-[[runs]]
-rows = 16
-share = 0.10
-steady = ["load_N"]
-
-[[runs]]
-rows = 16
-share = 0.10
-steady = ["slip"]
-
-[[runs]]
-rows = 8
-share = 0.08
-steady = ["slip", "load_N"]
-"""
+RUNS = "".join(
+    f"[[runs]]\nrows = {rows}\nshare = {share}\nsteady = {steady}\n"
+    for rows, share, steady in (
+        (1, 0.52, []),
+        (32, 0.14, []),
+        (8, 0.06, []),
+        (16, 0.10, ["load_N"]),
+        (16, 0.10, ["slip"]),
+        (8, 0.08, ["slip", "load_N"]),
+    )
+)
 
 
 @dataclass(frozen=True)
@@ -121,10 +101,6 @@ class DrivenRange:
         if isinstance(gear := case.model.gear, EmulatedGear):
             slips, loads = gear.cut("slip", slips), gear.cut("load", loads)
         return DrivenRange(slips, loads)
-
-    def as_toml(self) -> str:
-        """The table [operating] of a recipe."""
-        return f"[operating]\nslip = {list(self.slip)}\nload_N = {list(self.load)}\n"
 
 
 def _three_digits(x: float) -> float:
@@ -193,20 +169,6 @@ def board_unknowns(case: Case) -> tuple[Case, list[Remark]]:
     return replace(case, prior=kept), [Remark("prior-fixed", text, tuple(dropped))]
 
 
-def untrainable_effects(case: Case) -> dict[str, tuple[str, ...]]:
-    """Effects that need what a file for the board is not given, with the columns they need."""
-    return {
-        effect.name: tuple(COVARIATES[field] for field in effect.about.needs)
-        for effect in case.model.effects
-        if effect.about.needs
-    }
-
-
-def sensor_effects(case: Case) -> tuple[Effect, ...]:
-    """Effects whose cause is a sensor or the rig."""
-    return tuple(e for e in case.model.effects if e.about.kind in ("sensor", "rig"))
-
-
 def recipe_text(case: Case, driven: DrivenRange, rows: int, seed: int) -> str:
     """A recipe: soils of the priors, sensors of the case, slips and loads of the log.
 
@@ -219,7 +181,8 @@ def recipe_text(case: Case, driven: DrivenRange, rows: int, seed: int) -> str:
         case, noise=noise, bias=bias, discrepancy={}, remainder=None, soil_tests=(), rover=None
     )
     top = f"rows = {rows}\nseed = {seed}\n\n"
-    return f"{top}{case_as_toml(own)}\n{driven.as_toml()}\n{RUNS}"
+    ends = f"[operating]\nslip = {list(driven.slip)}\nload_N = {list(driven.load)}\n"
+    return f"{top}{case_as_toml(own)}\n{ends}\n{RUNS}"
 
 
 def within_carried_loads(
@@ -251,9 +214,3 @@ def within_carried_loads(
         "hub on most soils of [soil.prior]; priors of firmer soils would reach further"
     )
     return replace(driven, load=(driven.load[0], most)), [Remark("loads-narrowed", text)]
-
-
-def with_fitted_soil(case: Case, fitted: Mapping[str, float]) -> Case:
-    """The case with the values of a fit for the parameters that it has."""
-    known = case.parameters()
-    return case.with_values({path: v for path, v in fitted.items() if path in known})

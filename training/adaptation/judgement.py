@@ -79,8 +79,7 @@ class JudgedRun:
     rows: Table  # The later rows
     before: RunPrediction
     after: RunPrediction
-    scores_before: dict[str, ChannelScore]  # By column
-    scores_after: dict[str, ChannelScore]
+    scores: dict[str, tuple[ChannelScore, ChannelScore]]  # Before and after, by column
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,7 @@ class Judgement:
     @property
     def channels(self) -> tuple[str, ...]:
         """Columns that were predicted, in the order of the model's channels."""
-        found = {key for run in self.runs for key in run.scores_before}
+        found = {key for run in self.runs for key in run.scores}
         return tuple(column(n) for n in CHANNELS if column(n) in found)
 
     def figures(
@@ -110,14 +109,12 @@ class Judgement:
         most = {run.run: run.first_rows for run in self.runs}  # in ascending order
         wanted = most if first_rows is None else dict.fromkeys(most, first_rows)
         runs = [run for run in self.runs if run.first_rows == wanted[run.run]]
-        return {
-            key: (
-                _mean([r.scores_before[key] for r in runs if key in r.scores_before]),
-                _mean([r.scores_after[key] for r in runs if key in r.scores_after]),
-            )
-            for key in self.channels
-            if any(key in r.scores_before for r in runs)
-        }
+        found = {}
+        for key in self.channels:
+            if pairs := [run.scores[key] for run in runs if key in run.scores]:
+                before, after = zip(*pairs, strict=True)
+                found[key] = _mean(before), _mean(after)
+        return found
 
     def error(self, first_rows: int | None = None) -> tuple[float, float]:
         """Root mean square over channels of the errors of `figures` before and after."""
@@ -178,12 +175,14 @@ def judge(
             first, later = rows.rows(np.arange(k)), rows.rows(np.arange(k, len(rows)))
             pair = [predict_run(c, first, later, scale, seed) for c in (before, after)]
             judged.append(_judged(name, k, later, pair, scale))
-            known = dict(truth or {}) | known_soil(rows, pair[0].estimate.names)
+            names = {n: column(n) for n in pair[0].estimate.names}
+            true = {n: float(np.mean(rows[key])) for n, key in names.items() if key in rows}
+            known = dict(truth or {}) | {n: x for n, x in true.items() if np.isfinite(x)}
             for i, parameter in enumerate(pair[0].estimate.names):
                 if parameter in known:
                     off = [float(p.estimate.mean[i]) - known[parameter] for p in pair]
                     errors.setdefault(parameter, []).append((off[0], off[1]))
-    judged = [run for run in judged if run.scores_before]
+    judged = [run for run in judged if run.scores]
     if not judged:
         raise InputError(
             f"{kept_back.source}: no later row of a run that is kept back can be predicted by both "
@@ -201,16 +200,6 @@ def check_lengths(kept_back: Table, first_rows: Sequence[int] = FIRST_ROWS) -> N
             f"{kept_back.source}: a run that is kept back has {most} rows with slip above 0 and "
             f"torque; needed are more than {min(first_rows)}, from which the others are predicted"
         )
-
-
-def known_soil(rows: Table, names: Sequence[str]) -> dict[str, float]:
-    """True parameters of a run, from its columns such as cohesion_Pa."""
-    found = {}
-    for name in names:
-        key = column(name)
-        if key in rows and np.isfinite(rows[key]).all():
-            found[name] = float(np.mean(rows[key]))
-    return found
 
 
 def _drivable(rows: Table) -> Table:
@@ -279,15 +268,15 @@ def _judged(
     name: str, k: int, later: Table, pair: Sequence[RunPrediction], scale: Mapping[str, float]
 ) -> JudgedRun:
     """Scores of both predictions, on the readings that both predict."""
-    scores: tuple[dict[str, ChannelScore], dict[str, ChannelScore]] = ({}, {})
+    scores = {}
     for key, size in scale.items():
         known = np.isfinite(later[key])
         for prediction in pair:
             known = known & np.isfinite(prediction.mean[key]) & (prediction.std[key] > 0.0)
         if known.any():
-            for own, prediction in zip(scores, pair, strict=True):
-                own[key] = _score(later[key], prediction, key, size, known)
-    return JudgedRun(name, k, later, pair[0], pair[1], *scores)
+            before, after = (_score(later[key], own, key, size, known) for own in pair)
+            scores[key] = before, after
+    return JudgedRun(name, k, later, pair[0], pair[1], scores)
 
 
 def _score(

@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
+
+import numpy as np
 
 from soilml.errors import InputError
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
+from soilml.quantities import Z_90
 from soilml.remarks import Remark
-from soilml.report.numbers import decimal
+from soilml.report.figure_style import AFTER, BEFORE
+from soilml.report.numbers import (
+    channel_name,
+    channel_unit,
+    decimal,
+    format_quantity,
+    parameter_name,
+    pretty,
+    significant,
+    with_unit,
+)
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
-from training.adaptation.judgement import ChannelScore, Judgement
-
-if TYPE_CHECKING:
-    from soilml.report.report import Report
+from training.adaptation.judgement import JudgedRun, Judgement
 
 #: Status of an adaptation, and its meaning.
 ADAPTATION_STATUSES = {
@@ -23,6 +37,15 @@ ADAPTATION_STATUSES = {
     "not-judged": "an adapted file was trained, and the campaign has too few runs to judge it",
     "not-supported": "the gap analysis does not support a change of the model",
 }
+#: Tone of the verdict, and its status in words, by status.
+TONES = {
+    "adapted": ("good", "adapted"),
+    "not-better": ("warn", "old file stays"),
+    "not-judged": ("warn", "not judged"),
+    "not-supported": ("plain", "old file stays"),
+}
+MARKERS = ("o", "s", "^", "D")  # Of the runs in the picture
+MOST_RUNS, PANEL = len(MARKERS), (4.4, 3.6)  # Width and height of a panel, inches
 
 
 @dataclass(frozen=True, repr=False)
@@ -80,9 +103,43 @@ class AdaptReport(Result):
 
     def report(self) -> Report:
         """Whether the file is better, by how much, and what to do."""
-        from training.adaptation.page import report_of_adaptation
+        judged = self.judgement
+        trained = self.status != "not-supported"
+        basis = "no run was kept back" if trained else "no file was trained"
+        if judged is not None:
+            runs = f"run{'s' if len(self.kept_back) > 1 else ''} {', '.join(self.kept_back)}"
+            basis = f"judged on {runs}, which neither file was made from"
+        tone, status = TONES[self.status]
+        return Report(
+            kind="adapt",
+            verdict=self.sentence,
+            lines=[f"{self.gap_status}: {self.gap_sentence}"] if trained else [],
+            tables=[] if judged is None else _tables(self, judged),
+            pictures=[] if judged is None else [_picture(judged)],
+            remarks=self.remarks,
+            next_steps=self._next_steps(),
+            status=status,
+            tone=tone,
+            title="A file for the board, adapted to a campaign",
+            basis=basis,
+            notation=[
+                ("error", "root mean square of measured - predicted, over the channel's range"),
+                ("log score", "mean logarithm of the predictive density of a reading, in ranges"),
+            ],
+        )
 
-        return report_of_adaptation(self)
+    def _next_steps(self) -> list[str]:
+        if self.status == "not-judged":
+            return [f"measure the runs of gap/next_runs.csv before {self.files[0]} flies"]
+        if self.status == "adapted":
+            return [f"put {self.files[0]} on the board, or compile {self.files[2]}"]
+        if any(remark.code == "prior-opened" for remark in self.remarks):
+            return ["change the priors in [soil.prior] of the model file, and run this again"]
+        if self.gap_status == "suspected" and self.judgement is None:
+            return ["see gap/report.html; --suspected tries the first suspect all the same"]
+        if self.gap_status == "no-gap":
+            return []
+        return ["see gap/report.html, and measure the runs of gap/next_runs.csv"]
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each channel and number of first rows: errors and log scores of both files.
@@ -130,25 +187,12 @@ def _judgement_json(judgement: Judgement) -> dict[str, Any]:
         "error_ratio": judgement.ratio,
         "error": {"before": before, "after": after},
         "by_first_rows": {
-            str(k): {key: _pair(b, a) for key, (b, a) in judgement.figures(k).items()}
+            str(k): {
+                key: {"before": vars(old), "after": vars(new)}
+                for key, (old, new) in judgement.figures(k).items()
+            }
             for k in judgement.lengths
         },
-        "runs": [
-            {
-                "run": run.run,
-                "first_rows": run.first_rows,
-                "later_rows": len(run.rows),
-                "in_range": {
-                    "before": bool(run.before.estimate.in_range),
-                    "after": bool(run.after.estimate.in_range),
-                },
-                "channels": {
-                    key: _pair(run.scores_before[key], run.scores_after[key])
-                    for key in run.scores_before
-                },
-            }
-            for run in judgement.runs
-        ],
         "soil_error": {
             name: {"before": b, "after": a, "unit": units.get(name, "")}
             for name, (b, a) in judgement.soil_error.items()
@@ -156,5 +200,75 @@ def _judgement_json(judgement: Judgement) -> dict[str, Any]:
     }
 
 
-def _pair(before: ChannelScore, after: ChannelScore) -> dict[str, dict[str, float]]:
-    return {"before": dict(vars(before)), "after": dict(vars(after))}
+def _tables(found: AdaptReport, judged: Judgement) -> list[ReportTable]:
+    """Errors and log scores by channel and number of first rows; errors of a known soil."""
+    own = found.frame_columns()
+    tables = [
+        ReportTable(
+            "Later rows, predicted from the first",
+            [
+                Column("predicted", [channel_name(key) for key in own["predicted"]]),
+                Column("first rows", own["first_rows"]),
+                Column("error before", own["error_before"], "share", digits=2),
+                Column("error after", own["error_after"], "share", digits=2),
+                Column("log score before", own["log_score_before"], digits=3),
+                Column("after", own["log_score_after"], digits=3),
+            ],
+        )
+    ]
+    if judged.soil_error:
+        units = [declared(Soil)[name].unit for name in judged.soil_error]
+        before, after = ([pair[k] for pair in judged.soil_error.values()] for k in (0, 1))
+        columns = [
+            Column("soil", [parameter_name(name) for name in judged.soil_error]),
+            Column("error before", before, units, digits=3),
+            Column("after", after, units, digits=3, sizes=before),
+        ]
+        tables.append(ReportTable("Estimates against the known soil", columns))
+    return tables
+
+
+def _picture(judged: Judgement) -> Picture:
+    """A panel for each channel."""
+    count, k = len(judged.channels), judged.lengths[-1]
+    before, after = (format_quantity(x, "share", digits=2) for x in judged.error())
+    return Picture(
+        "Runs kept back",
+        partial(_draw, judged),
+        1,
+        count,
+        (PANEL[0] * count, PANEL[1]),
+        f"{', '.join(map(channel_name, judged.channels))} over slip, measured and predicted by "
+        f"both files; errors of {before} before and {after} after",
+        f"The soil was estimated from the torque of the first {k} rows of a run. Points: the later "
+        "rows as measured. Lines: as predicted by the old file (orange, dashed) and by the adapted "
+        "one (blue, with its 90 % band).",
+    )
+
+
+def _draw(judged: Judgement, axes: Any) -> None:
+    runs = [run for run in judged.runs if run.first_rows == judged.lengths[-1]][:MOST_RUNS]
+    for panel, key in zip(np.asarray(axes).flat, judged.channels, strict=True):
+        _draw_channel(panel, key, runs)
+
+
+def _draw_channel(axes: Any, key: str, runs: Sequence[JudgedRun]) -> None:
+    """Readings of the later rows, and both predictions, over slip."""
+    factor, unit = channel_unit(key)
+    for marker, run in zip(MARKERS, runs, strict=False):
+        order = np.argsort(run.rows["slip"], kind="stable")
+        slip = run.rows["slip"][order]
+        load = float(np.median(run.rows["load_N"]))
+        after = factor * run.after.mean[key][order]
+        band = Z_90 * factor * run.after.std[key][order]
+        axes.fill_between(slip, after - band, after + band, color=AFTER, alpha=0.15, lw=0)
+        axes.plot(slip, factor * run.before.mean[key][order], "--", color=BEFORE, lw=1.6)
+        axes.plot(slip, after, "-", color=AFTER, lw=1.6)
+        axes.plot(
+            slip, factor * run.rows[key][order], marker, color="black", ms=4.2, ls="none",
+            label=f"{run.run}, {significant(load, 3)} N",
+        )  # fmt: skip
+    name = channel_name(key)
+    axes.set_title(pretty(with_unit(name, unit)))
+    axes.set_xlabel("slip")
+    axes.legend()

@@ -130,7 +130,7 @@ def supported_errors(case: Case, kept_back: Table, whole: Table) -> SupportedErr
     O'Hagan, J. R. Statist. Soc. B 63(3), 2001 (errors that all readings share).
     """
     rest = 1.0 - CHECKED.probability
-    scales = [CHECKED, *(replace(s, probability=s.probability * rest) for s in LARGER)]
+    scales = [CHECKED, *(s._replace(probability=s.probability * rest) for s in LARGER)]
     prior = np.asarray([scale.probability for scale in scales])
     own = replace(case, discrepancy={}, remainder=None, soil_tests=())
     fits = [_fits(own, rows, scales) for rows in (kept_back, whole)]
@@ -138,7 +138,7 @@ def supported_errors(case: Case, kept_back: Table, whole: Table) -> SupportedErr
     widest = min(found, key=lambda probabilities: float(probabilities[0]))
     return SupportedErrors(
         ErrorScales(
-            tuple(replace(s, probability=float(p)) for s, p in zip(scales, widest, strict=True))
+            tuple(s._replace(probability=float(p)) for s, p in zip(scales, widest, strict=True))
         ),
         _sensor_errors(own, fits[1], widest),
     )

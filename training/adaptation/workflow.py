@@ -5,58 +5,68 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+import onnx
 
+from datagen.generate import generate
+from datagen.recipe import read_recipe
 from soilml.config.case import Case, read_case
 from soilml.config.explanations import likeliest_with_effects
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
-from soilml.gap import gap
-from soilml.gap.evidence.holdout_split import RUNS_PER_HELD_OUT
-from soilml.gap.report.report import gap_files
-from soilml.gap.verdict.decision import OUTSIDE_PRIORS
+from soilml.gap import GapReport, gap
+from soilml.gap.disagreements import OUTSIDE_PRIORS
+from soilml.gap.held_out import RUNS_PER_HELD_OUT
+from soilml.gap.report import gap_files
 from soilml.identification.model_error_inputs import with_exact_model
 from soilml.identification.trained_estimator import estimators_for_case, with_sensors_of
-from soilml.io.atomic_files import create_folder, write_files
+from soilml.io.atomic_files import atomic_outputs, create_folder, save_text, write_files
 from soilml.io.read_table import Rows, as_table
-from soilml.io.table import Table
 from soilml.io.text_tables import csv_text
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.table_estimates import sensor_errors_shown
+from soilml.physics.operating_point import COVARIATES
+from soilml.processes import limited_workers, process_map
+from soilml.quantities import SHEAR
 from soilml.remarks import Remark
 from soilml.report.page import Provenance, json_text, page, report_entry
-from training.adaptation.board_file import FileNames, make_file
 from training.adaptation.campaign import (
     DrivenRange,
     board_unknowns,
     recipe_text,
-    sensor_effects,
     split_runs,
-    untrainable_effects,
-    with_fitted_soil,
     with_noise_of_log,
     within_carried_loads,
 )
 from training.adaptation.judgement import BoardCandidate, Judgement, check_lengths, judge
 from training.adaptation.result import AdaptReport
-from training.adaptation.steps import ResumableSteps
-from training.adaptation.supported_errors import SupportedErrors, supported_errors
+from training.adaptation.supported_errors import USUAL_ERRORS, SupportedErrors, supported_errors
+from training.dataset import read_dataset
+from training.export.model_card import model_card
+from training.export.model_file import export_model
+from training.export_c.c_file import write_c
+from training.set_posterior.families.recipe_family import RecipeFamily
+from training.set_posterior.response_surface import check_equilibria
+from training.spec import read_spec
+from training.train import train
 
 #: Statuses of a gap report with effects that the evidence supports.
 CLAIMED = ("named", "partly-named", "class", "form-open")
-#: Files of the folder, beside those of the two model files.
-RESULT_FILES = ("report.html", "adapt.json")
-ADAPTED, BEFORE = FileNames("adapted"), FileNames("before")
-ADAPTED_MODEL = "adapted.toml"
+SPEC = "fused"  # The packaged spec of a file: that of the released file for one wheel
+ROWS = 40_000  # Synthetic rows of each file, by default
 SPLIT_FILES = ("campaign.csv", "kept_back.csv")
 GAP_FILES = tuple(
     f"gap/{name}" for name in ("report.html", "gap.json", "model.toml", "next_runs.csv")
 )
-ROWS = 40_000  # Synthetic rows of each file, by default
+ADAPTED_FILES = (
+    *("adapted.onnx", "adapted.md", "adapted.c", "adapted.h", "adapted.toml"),
+    *("adapted_recipe.toml", "adapted_rows.parquet"),
+)
+BEFORE_FILES = ("before.onnx", "before.md", "before_recipe.toml", "before_rows.parquet")
 
 Progress = Callable[[str, int, int], None]
 
@@ -89,8 +99,6 @@ def adapt(
 
     Of fewer than four runs none is kept back: a file is then trained and not judged, and what the
     gap analysis says of rows that it kept back itself is all that speaks for it.
-
-    A call that was interrupted, or is repeated, keeps the steps whose inputs are the same.
 
     Parameters
     ----------
@@ -152,164 +160,173 @@ def adapt(
     table = table.rows(table.answered)
     split, driven = split_runs(table, seed), DrivenRange.of(table, case)
     old = board_unknowns(with_noise_of_log(case, table))[0]
-    earlier = _check_earlier(against, case, model_name)
-    target = Path(folder)
+    earlier = None
+    if against is not None:
+        given = [Estimator.load(against)]
+        earlier = estimators_for_case(given, case, model_name, pooled=True)[0][0]
+    target, remarks = Path(folder), list[Remark]()
+    judgement: Judgement | None = None
     with create_folder(target), create_folder(target / "gap"):
-        tables = [one for one in (split.campaign, split.kept_back) if one is not None]
-        texts = [csv_text(one.columns) for one in tables]
-        write_files({target / name: text for name, text in zip(SPLIT_FILES, texts, strict=False)})
-        steps = ResumableSteps(target)
-        steps.run(
-            "gap",
-            [case_as_toml(case), texts[0], str(seed)],
-            GAP_FILES,
-            lambda: _analyse(case, split.campaign, target, seed, progress, model_name, origin),
+        parts = [one for one in (split.campaign, split.kept_back) if one is not None]
+        split_files = SPLIT_FILES[: len(parts)]
+        texts = (csv_text(one.columns) for one in parts)
+        write_files({target / n: text for n, text in zip(split_files, texts, strict=True)})
+        stage = "analysing the gap"
+        progress(stage, 0, 100)
+        found = gap(
+            case,
+            split.campaign,
+            seed=seed,
+            progress=lambda share: progress(stage, round(100 * share), 100),
         )
-        found = _read_gap(target / "gap", case, suspected)
-        if found.refusal is not None:
-            report = found.report(split.runs, None, (), rows, seed)
-            return _finish(report, target, origin)
-        if split.kept_back is not None:
-            check_lengths(split.kept_back)
-        new, remarks = board_unknowns(with_noise_of_log(found.case, table))
-        for one in [new] if split.kept_back is None or against else [new, old]:
-            driven, narrowed = within_carried_loads(driven, one, seed)
-            remarks = [*remarks, *narrowed]
-        head = [f"With {' + '.join(found.effects)}. {found.sentence}"]
-        write_files({target / ADAPTED_MODEL: case_as_toml(found.case, head)})
-        make = partial(make_file, steps, seed=seed, workers=workers, progress=progress)
-        make_adapted = partial(make, ADAPTED, recipe_text(new, driven, rows, seed), as_c=True)
-        if split.kept_back is None:
-            make_adapted()
-            report = found.report((), None, [*remarks, _unjudged(table)], rows, seed)
-            return _finish(report, target, origin)
-        errors = supported_errors(new, split.kept_back, table)
-        remarks = [*remarks, _errors_remark(errors)]
-        file = make_adapted(errors=errors)
-        if earlier is None:
-            before = make(BEFORE, recipe_text(old, driven, rows, seed))
-            earlier = with_sensors_of(Estimator.load(before), old)
-        progress("judging", 0, 1)
-        own = with_fitted_soil(old, found.soil_before)
-        after = BoardCandidate(with_sensors_of(Estimator.load(file), new), new)
-        answers = [earlier, with_exact_model(earlier)]  # the old file is judged by the better one
-        judgements = [
-            judge(split.kept_back, BoardCandidate(answer, own), after, truth, seed=seed)
-            for answer in answers[: 1 + (answers[1] is not earlier)]
-        ]
-        judgement = max(judgements, key=lambda one: one.ratio)
-        if judgement is not judgements[0]:
-            remarks.append(_exact_remark())
-        progress("judging", 1, 1)
-        report = found.report(split.runs, judgement, remarks, rows, seed)
-        return _finish(report, target, origin, with_before=against is None)
-
-
-@dataclass(frozen=True)
-class AnalysedCampaign:
-    """What the gap analysis of a campaign found, as its files state it.
-
-    `case` is the model to train on; `refusal` says why there is none. `soil_before` has the soil of
-    the fit without effects.
-    """
-
-    status: str
-    sentence: str
-    effects: tuple[str, ...]
-    case: Case
-    soil_before: dict[str, float]
-    refusal: Remark | None
-
-    def report(
-        self,
-        kept_back: tuple[str, ...],
-        judgement: Judgement | None,
-        remarks: tuple[Remark, ...] | list[Remark],
-        rows: int,
-        seed: int,
-    ) -> AdaptReport:
-        """The result of the adaptation, whose files are not written yet."""
-        notes = list(remarks) + ([self.refusal] if self.refusal else [])
-        effects: tuple[str, ...] = ()
-        status = "not-supported"
-        if self.refusal is None:
-            effects, status = self.effects, "not-judged"
-            notes += _sensor_remark(self.case)
-        if judgement is not None:
-            status = "adapted" if judgement.ratio < 1.0 else "not-better"
-        return AdaptReport(
-            status, self.status, self.sentence, effects, kept_back,
-            judgement, (), tuple(notes), rows, seed,
+        files = gap_files(found, model_name, SPLIT_FILES[0], origin)
+        write_files({target / "gap" / name: text for name, text in files.items()})
+        model = target / "gap/model.toml"
+        learned = likeliest_with_effects(read_case(model, with_bias=True, with_explanations=True))
+        known = {effect.name for effect in case.model.effects}
+        effects = tuple(e.name for e in learned.model.effects if e.name not in known)
+        made: tuple[str, ...] = ()
+        if (refusal := _refusal(found, learned, effects, suspected)) is not None:
+            status, effects, remarks = "not-supported", (), [refusal]
+        else:
+            status, made = "not-judged", ADAPTED_FILES
+            if split.kept_back is not None:
+                check_lengths(split.kept_back)
+            new, remarks = board_unknowns(with_noise_of_log(learned, table))
+            for one in [new] if split.kept_back is None or against else [new, old]:
+                driven, narrowed = within_carried_loads(driven, one, seed)
+                remarks = [*remarks, *narrowed]
+            head = [f"With {' + '.join(effects)}. {found.sentence}"]
+            write_files({target / "adapted.toml": case_as_toml(learned, head)})
+            make = partial(make_file, target, seed=seed, workers=workers, progress=progress)
+            recipe, errors = recipe_text(new, driven, rows, seed), USUAL_ERRORS
+            if split.kept_back is not None:
+                errors = supported_errors(new, split.kept_back, table)
+                remarks.append(_errors_remark(errors))
+            file = make("adapted", recipe, errors=errors, as_c=True)
+            if split.kept_back is None:
+                remarks.append(_unjudged(np.unique(table["run"]).size))
+            else:
+                if earlier is None:
+                    made = (*made, *BEFORE_FILES)
+                    before = make("before", recipe_text(old, driven, rows, seed))
+                    earlier = with_sensors_of(Estimator.load(before), old)
+                progress("judging", 0, 1)
+                fitted = {n: v.value for n, v in found.soil_before.items() if n in old.parameters()}
+                own = old.with_values(fitted)
+                after = BoardCandidate(with_sensors_of(Estimator.load(file), new), new)
+                exact = with_exact_model(earlier)  # the old file is judged by its better answer
+                judgements = [
+                    judge(split.kept_back, BoardCandidate(answer, own), after, truth, seed=seed)
+                    for answer in ([earlier] if exact is earlier else [earlier, exact])
+                ]
+                judgement = max(judgements, key=lambda one: one.ratio)
+                if judgement is not judgements[0]:
+                    remarks.append(OLD_MODEL_RIGHT)
+                progress("judging", 1, 1)
+                status = "adapted" if judgement.ratio < 1.0 else "not-better"
+            remarks += _sensor_remark(learned)
+        report = AdaptReport(
+            status, found.status, found.sentence, effects, split.runs,
+            judgement, (*made, *split_files, *GAP_FILES), tuple(remarks), rows, seed,
         )  # fmt: skip
+        origin = origin or Provenance.of(["adapt"], [])
+        shown = report.report()
+        content = report.as_json() | {"report": report_entry(shown, origin)}
+        stale = {*ADAPTED_FILES, *BEFORE_FILES, *SPLIT_FILES} - set(report.files)
+        write_files(
+            {
+                target / "report.html": page(shown, origin),
+                target / "adapt.json": json_text(content),
+            },
+            remove=[target / name for name in sorted(stale)],
+        )
+    return report
 
 
-def _check_earlier(
-    against: str | os.PathLike[str] | None, case: Case, model_name: str
-) -> Estimator | None:
-    """The file to compare with, for the case; `InputError` where it is of another wheel."""
-    if against is None:
-        return None
-    given, _ = estimators_for_case([Estimator.load(against)], case, model_name, pooled=True)
-    return given[0]
-
-
-def _analyse(
-    case: Case,
-    campaign: Table,
+def make_file(
     folder: Path,
+    name: str,
+    recipe: str,
+    *,
     seed: int,
-    progress: Progress,
-    model_name: str,
-    origin: Provenance | None,
-) -> None:
-    """Analyse the campaign and write the files of the gap."""
-    stage = "analysing the gap"
-    progress(stage, 0, 100)
-    report = gap(
-        case, campaign, seed=seed, progress=lambda share: progress(stage, round(100 * share), 100)
-    )
-    progress(stage, 100, 100)
-    texts = gap_files(report, model_name, SPLIT_FILES[0], origin)
-    write_files({folder / "gap" / name: text for name, text in texts.items()})
+    errors: SupportedErrors = USUAL_ERRORS,
+    workers: int | None = None,
+    as_c: bool = False,
+    progress: Progress = lambda text, done, total: None,
+) -> Path:
+    """Generate the rows of a recipe, train a set posterior on them and export it, with its card.
+
+    name: Beginning of the names of its files in the folder.
+    recipe: Text of the recipe; see `training.adaptation.campaign.recipe_text`.
+    seed: Of the training.
+    errors: Sizes of the errors of its model and sensors.
+    as_c: Whether C code is written as well.
+
+    Returns: The path of the model file.
+    Raises `InputError` for a recipe that a set posterior cannot have, or whose rows have no
+    equilibrium.
+    """
+    save_text(folder / f"{name}_recipe.toml", recipe)
+    found, spec = read_recipe(folder / f"{name}_recipe.toml"), read_spec(SPEC)
+    targets = tuple(target for target in SHEAR if target in found.case.prior)
+    content = json.loads(spec.text) | {"targets": list(targets), "seed": seed}
+    if errors is not USUAL_ERRORS:
+        stated = {"model_errors": errors.scales.as_list(), "sensor_errors": errors.sensors}
+        content["set_posterior"] |= stated
+    assert spec.set_posterior is not None
+    own = replace(spec.set_posterior, seed=seed, scales=errors.scales, sensor_errors=errors.sensors)
+    text = json.dumps(content, sort_keys=True)
+    spec = replace(spec, seed=seed, targets=targets, set_posterior=own, text=text)
+    # raises before rows are simulated and the training begins
+    check_equilibria(RecipeFamily.of(found, spec.targets), seed)
+    rows = folder / f"{name}_rows.parquet"
+    engine = partial(process_map, workers=workers)
+    generate(found, rows, lambda done: progress(f"{name}: simulating", done, found.rows), engine)
+    names = (f"{name}.onnx", f"{name}.md", f"{name}.c", f"{name}.h")
+    with limited_workers(workers):
+        data = read_dataset(rows, spec.features, spec.targets)
+        trained = train(spec, data, lambda text, *steps: progress(f"{name}: {text}", *steps))
+        with atomic_outputs([folder / one for one in names[: 4 if as_c else 2]]) as outputs:
+            metadata = export_model(trained, outputs[0], rows)
+            outputs[1].write_text(model_card(trained, metadata, name), encoding="utf-8")
+            if as_c:
+                written = write_c(onnx.load(str(outputs[0])), metadata, name, names[0])
+                outputs[2].write_text(written.source, encoding="utf-8")
+                outputs[3].write_text(written.header, encoding="utf-8")
+    return folder / names[0]
 
 
-def _read_gap(folder: Path, case: Case, suspected: bool) -> AnalysedCampaign:
-    """The gap of a campaign from its files, and whether it supports a change."""
-    content = json.loads((folder / "gap.json").read_text(encoding="utf-8"))
-    status = content["status"]
-    found = likeliest_with_effects(
-        read_case(folder / "model.toml", with_bias=True, with_explanations=True)
-    )
-    known = {effect.name for effect in case.model.effects}
-    effects = tuple(e.name for e in found.model.effects if e.name not in known)
-    refusal = None
+def _refusal(
+    found: GapReport, learned: Case, effects: tuple[str, ...], suspected: bool
+) -> Remark | None:
+    """Why the gap analysis supports no model that a file can be trained on; None where it does."""
+    status = found.status
     if not (status in CLAIMED or (status == "suspected" and suspected)) or not effects:
         text = f"the gap analysis ends with {status}, which supports no change of the model"
-        refusal = Remark(f"gap-{status}", text, severity="note")
-    elif any(one["code"] in ("prior-opened", OUTSIDE_PRIORS) for one in content["reasons"]):
+        return Remark(f"gap-{status}", text, severity="note")
+    if any(one.code in ("prior-opened", OUTSIDE_PRIORS) for one in found.reasons):
         text = (
             "only soils outside of [soil.prior] explain the gap; give priors in which the "
             "soils to come lie, and in which gap/report.html finds that of the campaign"
         )
-        refusal = Remark("prior-opened", text)
-    elif needed := untrainable_effects(found):
-        parts = [f"{effect} needs {', '.join(columns)}" for effect, columns in needed.items()]
+        return Remark("prior-opened", text)
+    needed = {e.name: e.about.needs for e in learned.model.effects if e.about.needs}
+    if needed:
+        parts = [f"{n} needs {', '.join(COVARIATES[f] for f in own)}" for n, own in needed.items()]
         text = f"{'; '.join(parts)}, which a file for the board is not given: none can be trained"
-        refusal = Remark("effect-not-trainable", text, tuple(needed))
-    soil = {name: float(entry["value"]) for name, entry in content["soil_before"].items()}
-    return AnalysedCampaign(status, content["sentence"], effects, found, soil, refusal)
+        return Remark("effect-not-trainable", text, tuple(needed))
+    return None
 
 
 def _sensor_remark(case: Case) -> list[Remark]:
     """A remark where what was added is an error of a sensor or of the rig."""
-    names = tuple(effect.name for effect in sensor_effects(case))
-    if not names:
-        return []
+    names = tuple(e.name for e in case.model.effects if e.about.kind in ("sensor", "rig"))
     text = (
         f"{', '.join(names)}: an error of a sensor or of the rig; the adapted file is for readings "
         "of the same one alone"
     )
-    return [Remark("sensor-error-trained", text, names)]
+    return [Remark("sensor-error-trained", text, names)] if names else []
 
 
 def _errors_remark(errors: SupportedErrors) -> Remark:
@@ -325,47 +342,19 @@ def _errors_remark(errors: SupportedErrors) -> Remark:
     return Remark("model-errors", text, severity="note")
 
 
-def _exact_remark() -> Remark:
-    """A note on the answer by which the old file is judged."""
-    text = (
-        "the old file is judged assuming a perfect model (model_error 0), with which it "
-        "predicts the runs kept back better than with its own errors of the model"
-    )
-    return Remark("old-model-right", text, severity="note")
+OLD_MODEL_RIGHT = Remark(
+    "old-model-right",
+    "the old file is judged assuming a perfect model (model_error 0), with which it predicts the "
+    "runs kept back better than with its own errors of the model",
+    severity="note",
+)
 
 
-def _unjudged(table: Table) -> Remark:
+def _unjudged(runs: int) -> Remark:
     """A remark on a campaign of which no run was kept back."""
-    count = np.unique(table["run"]).size
     text = (
-        f"{count} run{'s' * (count != 1)}: of {RUNS_PER_HELD_OUT} or more, a quarter is kept back "
+        f"{runs} run{'s' * (runs != 1)}: of {RUNS_PER_HELD_OUT} or more, a quarter is kept back "
         "and judges both files; here gap/report.html alone says how well rows are predicted, and "
         "the file has the usual errors of a model"
     )
     return Remark("few-runs", text)
-
-
-def _finish(
-    report: AdaptReport, folder: Path, origin: Provenance | None, with_before: bool = False
-) -> AdaptReport:
-    """Write page and JSON; files that an earlier call left, and this result lacks, are removed."""
-    made: tuple[str, ...] = ()
-    adapted = (*ADAPTED.model, *ADAPTED.code, ADAPTED_MODEL, ADAPTED.recipe, ADAPTED.rows)
-    before = (*BEFORE.model, BEFORE.recipe, BEFORE.rows)
-    if report.status != "not-supported":
-        made = (*adapted, *(before if with_before else ()))
-    parts = SPLIT_FILES if report.kept_back else SPLIT_FILES[:1]
-    report = replace(report, files=(*made, *parts, *GAP_FILES[:4]))
-    if origin is None:
-        origin = Provenance.of(["adapt"], [])
-    shown = report.report()
-    content = report.as_json() | {"report": report_entry(shown, origin)}
-    stale = [n for n in (*adapted, *before, *SPLIT_FILES) if n not in (*made, *parts)]
-    write_files(
-        {
-            folder / RESULT_FILES[0]: page(shown, origin),
-            folder / RESULT_FILES[1]: json_text(content),
-        },
-        remove=[folder / name for name in stale],
-    )
-    return report

@@ -1,6 +1,5 @@
-"""Benchmark of estimators on fixed simulated sets, relative to the Bayes limit of the same sets.
+"""Methods compared on sets of readings whose soil is known: `compare` (in `comparison`).
 
-`benchmark` (in `suite`) scores model files, analytic methods and functions of the caller; `goals`
-(in `acceptance`) tests the scores against acceptance goals; `compare` (in `user_comparison`) does
-the same on the user's test data, without a Bayes limit.
+The sets are test data of the user, or those of the packaged recipe `benchmark`. The exact posterior
+of the same sets is one of the methods; it is the Bayes limit, which no estimator beats on average.
 """

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from training.onnx_graph.builder import Graph
-from training.regressors.standardisation import Standardisation
+from training.regressors.gaussian_regressor import Standardisation
 
 #: Readings that are operating conditions: the driver sets them, the soil does not.
 OPERATING_CONDITIONS = ("slip", "load")

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from soilml.cli.options import InputFile, add_workers_option
+from soilml.cli.options import OPTIONAL, InputFile
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
 
@@ -19,14 +19,11 @@ uncertainty by fits without each row's run, and export one ONNX file.
   soilml train any_wheel any.onnx        for wheels of any size; needs no data
 
 Packaged specs: fused, lssvm, mlp, linear, slip, ... Next to OUT.onnx, the
-command writes the model card OUT.md and the learning curves OUT.png. A spec
-contains
+command writes the model card OUT.md. A spec contains
 
   features = ["slip", "torque/load", "load"]   # measured quantities or ratios
   targets = ["cohesion", "friction_angle", "shear_modulus"]
                                      # parameters in the recipe, or slip
-  rule = "best-linear"               # fusion rule: or covariance-intersection,
-                                     # inverse-variance, ...
   seed = 0
   [[regressor]]                      # one or more; several are fused
   type = "fixed-size-lssvm"          # centres; gamma, width (tuned if absent)
@@ -35,9 +32,6 @@ contains
   type = "mlp"                       # hidden = [32, 32], epochs, steps, ...
   [[regressor]]
   type = "linear"
-  [[regressor]]
-  type = "lssvm"                     # exact up to 20 000 rows, beyond fixed-size;
-  solution = "exact"                 # or "fixed-size", whatever their number
   [set_posterior]                    # optional: pools all readings of a soil
   designs = 4096                     # by their likelihood, with a learned
   hidden = 64                        # response to slip, load and soil
@@ -47,28 +41,17 @@ contains
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "spec",
-        type=InputFile,
-        metavar="SPEC.toml",
-        help="spec file, or the name of a packaged spec",
-    )
-    parser.add_argument(
-        "data",
-        type=InputFile,
-        metavar="DATA.parquet",
-        nargs="?",
-        help="data written by soilml generate: a file, or a folder of files",
-    )
-    parser.add_argument("out", metavar="OUT.onnx", help="model file to write")
-    add_workers_option(parser)
+ARGUMENTS = (
+    ("spec SPEC.toml", "spec file, or the name of a packaged spec", InputFile),
+    ("data DATA.parquet", "data written by soilml generate, or measured", InputFile, OPTIONAL),
+    ("out OUT.onnx", "model file to write"),
+    "workers",
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
-    return output_files(args.out, ".onnx", ".md", ".png")
+    return output_files(args.out, ".onnx", ".md")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -93,7 +76,8 @@ def _any_wheel(args: argparse.Namespace) -> int:
     """Train the file for wheels of any size."""
     from soilml.cli.output import tell
     from soilml.cli.progress import stage_progress
-    from training.export.any_wheel_file import any_wheel_card, export_any_wheel
+    from training.export.model_card import any_wheel_card
+    from training.export.model_file import export_any_wheel
     from training.spec import read_any_wheel_spec
     from training.train import train_any_wheel
 
@@ -102,7 +86,7 @@ def _any_wheel(args: argparse.Namespace) -> int:
     spec, out = read_any_wheel_spec(args.spec), Path(args.out)
     with stage_progress() as progress:
         posterior, figures = train_any_wheel(spec, progress)
-        with atomic_outputs(outputs(args)[:2]) as (model, page):
+        with atomic_outputs(outputs(args)) as (model, page):
             metadata = export_any_wheel(spec, posterior, figures, model)
             page.write_text(
                 any_wheel_card(metadata, posterior.family.inputs(), figures, out.stem),
@@ -120,7 +104,6 @@ def _from_data(args: argparse.Namespace) -> int:
     from soilml.quantities import QUANTITIES
     from soilml.report.aligned_text import format_table
     from training.dataset import read_dataset
-    from training.export.learning_curves import plot_learning_curves
     from training.export.model_card import model_card
     from training.export.model_file import export_model
     from training.spec import read_spec
@@ -131,13 +114,11 @@ def _from_data(args: argparse.Namespace) -> int:
     data = read_dataset(args.data, spec.features, spec.targets)
     with stage_progress() as progress:
         trained = train(spec, data, progress)
-        progress("exporting", 0, 2)
-        with atomic_outputs(outputs(args)) as (model, page, picture):
+        progress("exporting", 0, 1)
+        with atomic_outputs(outputs(args)) as (model, page):
             metadata = export_model(trained, model, args.data)
-            progress("exporting", 1, 2)
-            plot_learning_curves(trained, picture)
             page.write_text(model_card(trained, metadata, out.stem), encoding="utf-8")
-        progress("exporting", 2, 2)
+        progress("exporting", 1, 1)
     rows = [
         (name, *[f"{v:.3f}" for v in s.relative], *[f"{v:.1%}" for v in s.cover90])
         for name, s in trained.scores.items()
@@ -153,6 +134,6 @@ def _from_data(args: argparse.Namespace) -> int:
     tell(
         f"\nwritten: {out} ({out.stat().st_size / 1e3:.0f} kB; largest difference of the float32 "
         f"file {metadata['parity']} prior standard deviations), "
-        f"{out.with_suffix('.md')}, {out.with_suffix('.png')}"
+        f"{out.with_suffix('.md')}"
     )
     return 0

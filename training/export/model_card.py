@@ -6,9 +6,11 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from soilml.quantities import SHEAR
 from training.calibration.recalibration import Metrics
 from training.regressors.gaussian_regressor import FeatureSubset
-from training.set_posterior.validation import table_of
+from training.set_posterior.error_scales import ErrorScales
+from training.set_posterior.validation import SetFigures, table_of
 from training.train import TrainedModel
 
 SINGLE_READING = (
@@ -49,6 +51,11 @@ SET_POSTERIOR = (
     "(`model_error` 0), as it is in the simulation; the file's own answer has errors of the model."
 )
 
+#: What a card says of a file for a microcontroller.
+SMALL = (
+    "For a microcontroller: the response has fewer monomials and a smaller network, and fewer "
+    "points are sampled."
+)
 #: How the prior is weighted where its soils do not carry all loads.
 CARRIED = (
     "Soils of the prior carry the wheel in {:.2%} of the operating conditions. The others take no "
@@ -103,7 +110,7 @@ def _summary(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]:
     regressors = ", ".join(_describe(member.regressor) for member in trained.members)
     text = f"Estimates {outputs} from one reading of {inputs}. Regressors: {regressors}."
     if len(trained.members) > 1:
-        text += f" Fused by the rule `{trained.spec.rule}`."
+        text += " They are fused by the covariance of their errors."
     return [text, "", PER_ROW if trained.spec.per_row else SINGLE_READING, ""]
 
 
@@ -179,3 +186,82 @@ def _metrics_table(scores: Mapping[str, Metrics], targets: list[str]) -> list[st
         label = f"**{name}**" if name == "estimator" else name
         lines.append(f"| {label} | {' | '.join(values)} |")
     return lines
+
+
+def any_wheel_card(
+    metadata: Mapping[str, str],
+    units: Mapping[str, str],
+    figures: Mapping[int, SetFigures],
+    name: str,
+) -> str:
+    """The card of a file for any wheel, from metadata, units of its own inputs, and set metrics."""
+    sets = json.loads(metadata["set"])
+    error, pressure, sinkage = sets["error"], sets["ground_pressure"], sets["sinkage_over_radius"]
+    noise = {
+        name: f"{100 * share:g} % + {constant:g}"
+        for name, (constant, share) in sets["noise"].items()
+    }
+    lines = [
+        f"# {name}",
+        "",
+        "Estimates cohesion, friction angle and shear modulus from one or many readings of slip, "
+        "torque and load, and of sinkage and drawbar pull where they are measured, for a rigid "
+        "wheel of any size: wheel, bearing values, noise and upper bounds of the prior are inputs.",
+        "",
+        f"    estimator = Estimator.load('{name}.onnx').on(wheel_radius=0.15, ...)",
+        "    estimator.run(slip=..., torque=..., load=...)",
+        "",
+        "The exact likelihood of all readings under a learned response of the wheel is sampled in "
+        "the graph; the posterior itself is not learned. Uncertain bearing values are integrated "
+        "out as errors that all rows share. Bearing values: the pressure is "
+        "bearing_modulus z^n, with bearing_modulus = kc / b + kphi; bearing_std is the standard "
+        "deviation of its logarithm at a sinkage of r / 20, and four times that of n. theta_m / "
+        "theta_1 is 0.4 + 0.15 s. The prior is uniform: cohesion from 0 to cohesion_max, friction "
+        "angle from 25 to 45 degrees, shear modulus from shear_modulus_max / 6 to "
+        "shear_modulus_max.",
+        "",
+        *([SMALL, ""] if sets.get("small") else []),
+        "## Valid for",
+        "",
+        "| input | unit | from | to |",
+        "|---|---|---:|---:|",
+        *[
+            f"| `{name}` | {units[name]} | {low:.4g} | {high:.4g} |"
+            for name, (low, high) in sets["context"].items()
+        ],
+        "",
+        f"Slip {_range(sets['slip'])}; load {_range(sets['load'])} N; load / (radius width) "
+        f"{_range(pressure)} Pa; sinkage / radius {_range(sinkage)} on soil in the middle of the "
+        "prior. Rows outside these ranges have `in_range` false.",
+        "",
+        f"Default noise: {json.dumps(noise)}.",
+        "",
+        "## Figures",
+        "",
+        f"Error of the learned response, rms: torque {error['torque']:.2%}, sinkage "
+        f"{error['sinkage']:.2%}, drawbar pull {error['drawbar_pull']:.2%} of the load.",
+        "",
+        "On fresh simulated sets: wheels, loads, soils and bearing values over their whole ranges, "
+        "torque noise from 1 to 8 %; a third of the sets with a bias of the torque sensor, a third "
+        "with a known bearing curve, a third with sinkage and drawbar pull. Error is RMSE / prior "
+        "std; 90 % is the coverage of the 90 % interval; refused sets count with the prior. The "
+        "model is taken as right there (`model_error` 0), as it is in the simulation; the file's "
+        "own answer has errors of the model.",
+        "",
+        *table_of(figures, list(SHEAR)),
+        *ErrorScales.of_list(sets["model_error_scales"]).for_card(),
+        "",
+        "## Made by",
+        "",
+        f"- spec sha256 `{metadata['spec_sha256']}`",
+        f"- spec: `{metadata['spec']}`",
+        f"- opset {metadata['opset']}, IR {metadata['ir_version']}; soilml "
+        f"{metadata['soilml_version']}",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _range(setting: Any) -> str:
+    low, high = setting["range"] if isinstance(setting, dict) else setting
+    return f"{low:g} to {high:g}"

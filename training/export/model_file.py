@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,15 +22,24 @@ from soilml.onboard.features import READABLE, compute_features, inputs_of, numer
 from soilml.onboard.held_out_errors import together
 from soilml.onboard.model_file import FORMAT, with_checksums
 from soilml.onboard.set_contract import INTERFACE
-from soilml.quantities import QUANTITIES
+from soilml.quantities import QUANTITIES, SHEAR, Z_90
 from training.dataset import PER_ROW
 from training.onnx_graph.builder import IR_VERSION, OPSET, Graph, Output, session_of
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.validation import figures_of, metadata_of, probe_of_sets
+from training.set_posterior.posterior_summary import prior_summary
+from training.set_posterior.validation import (
+    SetFigures,
+    figures_of,
+    metadata_of,
+    probe_of_sets,
+)
+from training.spec import AnyWheelSpec
 from training.train import TrainedModel
 
 #: Sums of inputs and features up to this are finite; one with NaN or an infinity is not below it.
 LARGEST_SUM = 1e300
+#: The input that the prior of an output scales with, in a file for any wheel.
+SCALES = {"cohesion": "cohesion_max", "shear_modulus": "shear_modulus_max"}
 
 
 def build_graph(trained: TrainedModel) -> Any:
@@ -119,63 +129,101 @@ def file_metadata(
     data_path: str | os.PathLike[str],
 ) -> dict[str, str]:
     """Metadata of a model file: what the runtime needs, provenance and metrics; values are JSON."""
-    spec, data = trained.spec, trained.data
-    recipe = data.recipe
-    inputs = [
-        {
-            "name": name,
-            "column": QUANTITIES[name].column,
-            "unit": QUANTITIES[name].unit,
-            "lower": float(values.min()),
-            "upper": float(values.max()),
-        }
-        for name, values in trained.data.measured.items()
-    ]
+    spec, data, prior = trained.spec, trained.data, trained.prior
+    posterior = trained.set_posterior
     outputs = [
-        {
-            "name": name,
-            "column": QUANTITIES[name].column,
-            "unit": QUANTITIES[name].unit,
-            "lower": float(data.lower[k]),
-            "upper": float(data.upper[k]),
-            "prior_mean": float(trained.prior.mean[k]),
-            "prior_std": float(trained.prior.std[k]),
-            **({"per_row": True} if name in PER_ROW else {}),
-        }
+        _quantity(name, data.lower[k], data.upper[k], prior.mean[k], prior.std[k])
+        | ({"per_row": True} if name in PER_ROW else {})
         for k, name in enumerate(spec.targets)
     ]
+    metrics = {
+        name: {
+            "rmse": score.rmse.tolist(),
+            "rmse_share_of_prior": score.relative.tolist(),
+            "nll": score.nll.tolist(),
+            "cover50": score.cover50.tolist(),
+            "cover90": score.cover90.tolist(),
+            "rows": score.rows,
+        }
+        for name, score in trained.scores.items()
+    }
+    entries = {
+        "inputs": [_quantity(n, v.min(), v.max()) for n, v in data.measured.items()],
+        "outputs": outputs,
+        "gear": dict(sorted(_gear_in_si(json.loads(data.recipe).get("gear", {})).items())),
+        "together": together(trained.left_out.factor, trained.errors),
+        "probe": probe,
+        **({} if posterior is None else {"set": metadata_of(posterior, sets_only=False)}),
+        "metrics": metrics,
+        "metrics_of_posterior": figures_of(trained.set_figures),
+    }
+    return _metadata(entries) | {
+        "spec": spec.text,
+        "recipe": data.recipe,
+        "recipe_sha256": hashlib.sha256(data.recipe.encode()).hexdigest(),
+        "data_sha256": _data_digest(Path(data_path)),
+        "parity": f"{parity:.3e}",
+    }
+
+
+def export_any_wheel(
+    spec: AnyWheelSpec,
+    posterior: SetPosteriorGraph,
+    figures: dict[int, SetFigures],
+    path: str | os.PathLike[str],
+) -> dict[str, str]:
+    """Write a file for wheels of any size, which has a set posterior only; returns its metadata.
+
+    Its bytes depend on the spec only.
+    """
+    posterior = replace(posterior, noise=spec.noise)
+    graph = Graph()
+    posterior.add_to(graph)
+    for name, value in posterior.defaults().items():
+        graph.default(name, value)
+    prior, axes = prior_summary(posterior.family), posterior.family.axes
+    outputs = [
+        _quantity(name, *axis.ends, prior["mean"][k], prior["std"][k])
+        | ({"scale": SCALES[name]} if name in SCALES else {})
+        for k, (name, axis) in enumerate(zip(SHEAR, axes, strict=False))
+    ]
+    entries = {
+        "inputs": [_quantity(name) for name in ("slip", "torque", "load")],
+        "outputs": outputs,
+        "gear": {"type": "wheel"},
+        "together": together(np.full(len(SHEAR), round(Z_90, 3))),
+        "set": metadata_of(posterior, sets_only=True),
+        "probe": probe_of_sets(posterior),
+        "recipe": {},
+        "metrics_of_posterior": figures_of(figures),
+    }
+    digest = hashlib.sha256(spec.text.encode()).hexdigest()
+    metadata = _metadata(entries) | {"spec": spec.text, "spec_sha256": digest}
+    write_model(graph.model(posterior.inputs, posterior.outputs), metadata, path)
+    return metadata
+
+
+def _metadata(entries: dict[str, Any]) -> dict[str, str]:
+    """Entries as JSON, and the versions of a file."""
     return {
         "soilml_format": FORMAT,
         "soilml_interface": INTERFACE,
         "soilml_version": __version__,
-        "inputs": json.dumps(inputs),
-        "outputs": json.dumps(outputs),
-        "gear": json.dumps(_gear_in_si(json.loads(recipe).get("gear", {})), sort_keys=True),
-        "together": json.dumps(together(trained.left_out.factor, trained.errors)),
-        "probe": json.dumps(probe),
-        **_set_metadata(trained.set_posterior),
-        "spec": spec.text,
-        "recipe": recipe,
-        "recipe_sha256": hashlib.sha256(recipe.encode()).hexdigest(),
-        "data_sha256": _data_digest(Path(data_path)),
-        "metrics": json.dumps(
-            {
-                name: {
-                    "rmse": score.rmse.tolist(),
-                    "rmse_share_of_prior": score.relative.tolist(),
-                    "nll": score.nll.tolist(),
-                    "cover50": score.cover50.tolist(),
-                    "cover90": score.cover90.tolist(),
-                    "rows": score.rows,
-                }
-                for name, score in trained.scores.items()
-            }
-        ),
-        "metrics_of_posterior": json.dumps(figures_of(trained.set_figures)),
-        "parity": f"{parity:.3e}",
         "opset": str(OPSET),
         "ir_version": str(IR_VERSION),
+        **{key: json.dumps(value) for key, value in entries.items()},
     }
+
+
+def _quantity(name: str, *numbers: float) -> dict[str, Any]:
+    """The entry of an input or output; of numbers so many as are given."""
+    keys = ("lower", "upper", "prior_mean", "prior_std")
+    entry: dict[str, Any] = {
+        "name": name,
+        "column": QUANTITIES[name].column,
+        "unit": QUANTITIES[name].unit,
+    }
+    return entry | {key: float(value) for key, value in zip(keys, numbers, strict=False)}
 
 
 def _gear_in_si(entry: dict[str, Any]) -> dict[str, Any]:
@@ -187,13 +235,6 @@ def _gear_in_si(entry: dict[str, Any]) -> dict[str, Any]:
         name: getattr(made, name, value) if isinstance(value, str) else value
         for name, value in entry.items()
     }
-
-
-def _set_metadata(posterior: SetPosteriorGraph | None) -> dict[str, str]:
-    """The entry "set" of a set posterior."""
-    if posterior is None:
-        return {}
-    return {"set": json.dumps(metadata_of(posterior, sets_only=False))}
 
 
 def _data_digest(path: Path) -> str:

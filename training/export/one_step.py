@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from soilml.onboard.set_contract import (
     SET_PREFIX,
     SET_SWITCH,
 )
-from training.onnx_graph.builder import OPSET, needed_nodes
+from training.onnx_graph.builder import OPSET, needed_nodes, without_branches
 
 ZERO, COLUMN_AXIS = "step_zero", "step_column_axis"  # Names of constants of the graph
 
@@ -43,9 +42,7 @@ def one_step_graph(model: Any, name: str, rows: int) -> Any:
     given = {value.name for value in graph.input}
     if not {*MEMORY_INPUTS} <= given:
         raise InputError(f"{name} has no set posterior: each of its answers is from one row")
-    nodes, initializers = list(graph.node), list(graph.initializer)
-    nodes, constants, renamed = _without_branches(nodes)
-    initializers += constants
+    nodes, initializers = without_branches(graph, lambda node: "then_branch")  # of sets
     wanted = [*(SET_PREFIX + one for one in (*SET_OUTPUTS, "abstains", "at_edge"))]
     wanted += [*MEMORY_OUTPUTS, ROW_IN_RANGE]
     columns = next(v for v in graph.input if v.name == MEMORY_INPUTS[0])
@@ -61,7 +58,7 @@ def one_step_graph(model: Any, name: str, rows: int) -> Any:
         for value in graph.output
         if value.name in wanted
     ]
-    nodes = [part for node in nodes for part in _without_compress(_renamed(node, renamed))]
+    nodes = [part for node in nodes for part in _without_compress(node)]
     initializers += [
         onnx.numpy_helper.from_array(np.zeros((), np.float32), ZERO),
         onnx.numpy_helper.from_array(np.ones(1, np.int64), COLUMN_AXIS),
@@ -76,27 +73,6 @@ def one_step_graph(model: Any, name: str, rows: int) -> Any:
         raise InputError(f"{name}: the shape of {', '.join(open_ended)} does not follow from rows")
     del fixed.graph.value_info[:]
     return fixed
-
-
-def _without_branches(nodes: Iterable[Any]) -> tuple[list[Any], list[Any], dict[str, str]]:
-    """Nodes with each If replaced by one branch, constants of these, and names of their results.
-
-    That is the set posterior of a file that has another branch.
-    """
-    found: list[Any] = []
-    constants: list[Any] = []
-    renamed: dict[str, str] = {}
-    for node in nodes:
-        if node.op_type != "If":
-            found.append(node)
-            continue
-        branch = next(a.g for a in node.attribute if a.name == "then_branch")
-        inside, of_branch, names = _without_branches(branch.node)
-        found += inside
-        constants += [*branch.initializer, *of_branch]
-        results = dict(zip([value.name for value in branch.output], node.output, strict=True))
-        renamed |= {name: results.get(new, new) for name, new in names.items()} | results
-    return found, constants, renamed
 
 
 def _without_compress(node: Any) -> list[Any]:
@@ -133,17 +109,6 @@ def _default(constant: Any, shape: list[int] | None) -> Any:
         return constant
     value = np.broadcast_to(onnx.numpy_helper.to_array(constant), shape)
     return onnx.numpy_helper.from_array(np.ascontiguousarray(value), constant.name)
-
-
-def _renamed(node: Any, names: dict[str, str]) -> Any:
-    """A node whose inputs and outputs have other names."""
-    import onnx
-
-    copy = onnx.NodeProto()
-    copy.CopyFrom(node)
-    for values in (copy.input, copy.output):
-        values[:] = [names.get(value, value) for value in values]
-    return copy
 
 
 def _pruned(model: Any) -> Any:

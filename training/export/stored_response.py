@@ -21,14 +21,14 @@ from soilml.io.toml_settings import Settings
 from soilml.onboard.set_contract import INTERFACE, RESPONSE_CHANNELS, SET_SWITCH
 from training.export.model_file import write_model
 from training.onnx_graph.builder import Graph, Output
-from training.regressors.standardisation import Standardisation
+from training.regressors.gaussian_regressor import Standardisation
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 from training.set_posterior.families.dimensionless_family import DimensionlessFamily
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.misfit_test import MisfitLimits
 from training.set_posterior.monomials import Terms
+from training.set_posterior.posterior_summary import MisfitLimits
 from training.set_posterior.residual_system import BOX_TOLERANCE
 from training.set_posterior.response_surface import Response, family_terms
 from training.set_posterior.validation import (

@@ -12,7 +12,7 @@ from soilml.errors import ModelFileError
 from training.export_c.operators import OPERATORS
 from training.export_c.program import Function, Node, Program, SharedParts
 from training.export_c.tensor import Tensor
-from training.onnx_graph.builder import DOMAIN, OPSET, needed_nodes
+from training.onnx_graph.builder import DOMAIN, OPSET, needed_nodes, without_branches
 
 #: Local functions of a file that are templates of C; others are replaced by their nodes.
 SOUND, FIRST, LIKELIEST, POSTERIOR = "SoundMemory", "FirstRound", "LikeliestSoil", "Posterior"
@@ -36,27 +36,19 @@ def flat_nodes(graph: Any, known: dict[str, Tensor]) -> list[Any]:
 
     Raises `ModelFileError` for a condition that depends on the readings.
     """
-    from onnx import helper, numpy_helper
+    from onnx import numpy_helper
 
-    for initial in graph.initializer:
-        known.setdefault(initial.name, Tensor.constant(numpy_helper.to_array(initial)))
-    nodes: list[Any] = []
-    for node in graph.node:
-        if node.op_type != "If":
-            nodes.append(node)
-            continue
+    def chosen(node: Any) -> str:
         condition = known.get(node.input[0])
         if condition is None or condition.value is None:
             raise ModelFileError(
                 "operator If whose condition depends on the readings is not known to export-c"
             )
-        chosen = "then_branch" if condition.value.all() else "else_branch"
-        branch = next(helper.get_attribute_value(a) for a in node.attribute if a.name == chosen)
-        nodes += flat_nodes(branch, known)
-        nodes += [
-            helper.make_node("Identity", [own.name], [name])
-            for own, name in zip(branch.output, node.output, strict=True)
-        ]
+        return "then_branch" if condition.value.all() else "else_branch"
+
+    nodes, constants = without_branches(graph, chosen)
+    for initial in constants:
+        known.setdefault(initial.name, Tensor.constant(numpy_helper.to_array(initial)))
     return nodes
 
 

@@ -207,7 +207,7 @@ def _function(kind: str) -> Callable[[Value], Value]:
 #: Functions of one value, element by element, named as in numpy.
 exp, log, sqrt = _function("Exp"), _function("Log"), _function("Sqrt")
 tanh, asinh, absolute = _function("Tanh"), _function("Asinh"), _function("Abs")
-floor, reciprocal = _function("Floor"), _function("Reciprocal")
+floor = _function("Floor")
 
 
 def softmax(x: Value, axis: int) -> Value:

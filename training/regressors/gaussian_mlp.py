@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from soilml.arrays import Floats
 from training.onnx_graph.builder import Graph
-from training.regressors.gaussian_regressor import GaussianRegressor, Progress
-from training.regressors.row_groups import Groups, row_weights
+from training.regressors.gaussian_regressor import GaussianRegressor, Groups, Progress
 from training.regressors.tanh_network import TanhNetwork, evaluate_layers, layer_pairs
 
 Singles = NDArray[np.float32]
@@ -71,7 +70,7 @@ class GaussianMLP(GaussianRegressor):
     def _fit_standardised(self, x: Floats, z: Floats, groups: Groups, progress: Progress) -> None:
         # one thread: sums in a fixed order; a step that is too long ends in infinities
         with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore"):
-            self._minimise(x, z, row_weights(groups), progress)
+            self._minimise(x, z, _row_weights(groups), progress)
 
     def _minimise(self, x: Floats, z: Floats, weights: Floats, progress: Progress) -> None:
         rng = np.random.default_rng(self.random_state)
@@ -108,9 +107,15 @@ class GaussianMLP(GaussianRegressor):
         """Layer widths."""
         return f"hidden {' x '.join(str(h) for h in self.hidden)}"
 
-    def learning_curve_parameters(self) -> dict[str, Any] | None:
-        """None: fitting again takes too long."""
-        return None
+
+def _row_weights(groups: Groups) -> Floats:
+    r"""Weights (n,) of rows in the loss, :math:`1 / \sqrt{m}` for m rows of a group, of mean 1.
+
+    Rows of a group say less than as many rows with errors of their own, and more than one.
+    """
+    _, code, count = np.unique(groups, return_inverse=True, return_counts=True)
+    weight = 1.0 / np.sqrt(count[code])
+    return np.asarray(weight / weight.mean())
 
 
 def _slopes(outputs: Singles, z: Singles, mean_only: bool) -> Singles:

@@ -8,19 +8,68 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from soilml.arrays import Floats
 from training.onnx_graph.builder import Graph
-from training.regressors.row_groups import Groups, folds_of
-from training.regressors.standardisation import Standardisation
 
+Groups = NDArray[np.int64]
 #: Called with the steps done and the total number of steps.
 Progress = Callable[[int, int], None]
 
 RANGE_ROWS = 20_000  # Most training rows on which the range of the log-variance is measured
 TAIL = 0.001  # Share of the training rows whose log-variances are clipped at either end
+#: Fits that leave some rows out. With fewer groups than the third number, a fit without a quarter
+#: of them would be clearly worse than that of all: there are more fits then.
+FOLDS, MOST_FOLDS, FEW_GROUPS = 4, 20, 300
+LOG_CHI2 = -1.2703628454614782  # Expectation of the logarithm of a squared standard normal variable
+#: Share of their mean that is added to squared residuals, so that their logarithms are finite.
+SQUARE_FLOOR = 1e-4
+
+
+def few_groups(groups: Groups) -> bool:
+    """Whether the rows (n,) are of few groups."""
+    return len(np.unique(groups)) < FEW_GROUPS
+
+
+def folds_of(groups: Groups) -> Groups:
+    """Number of the fold (n,) that leaves each row out; rows of one group are in one fold."""
+    names, code = np.unique(groups, return_inverse=True)
+    count = min(len(names), MOST_FOLDS if few_groups(groups) else FOLDS)
+    order = np.random.default_rng(0).permutation(len(names))
+    return np.asarray((order % count)[code])
+
+
+def log_squared_residuals(residual: Floats) -> Floats:
+    """Targets (n, q) for a log-variance: logarithms of squared residuals, corrected for bias."""
+    square = residual**2
+    floor = SQUARE_FLOOR * square.mean(axis=0) + 1e-300
+    return np.asarray(np.log(square + floor) - LOG_CHI2)
+
+
+@dataclass(frozen=True)
+class Standardisation:
+    """Mean and standard deviation (d,) of columns; a constant column has the scale 1."""
+
+    mean: Floats
+    scale: Floats
+
+    @staticmethod
+    def of(values: Floats) -> Standardisation:
+        """Mean and standard deviation of rows (n, d)."""
+        scale = values.std(axis=0)
+        tiny = 1e-12 * np.maximum(np.abs(values).max(axis=0), 1e-300)
+        return Standardisation(values.mean(axis=0), np.where(scale > tiny, scale, 1.0))
+
+    def apply(self, values: Floats) -> Floats:
+        """Standardised rows."""
+        return np.asarray((values - self.mean) / self.scale)
+
+    def undo(self, values: Floats) -> Floats:
+        """Rows in their original units."""
+        return np.asarray(values * self.scale + self.mean)
 
 
 @dataclass(frozen=True)
@@ -62,14 +111,6 @@ class GaussianHead:
         )
 
 
-@dataclass(frozen=True)
-class Requirements:
-    """What a fit will take: the size of the model in words, and the memory in bytes."""
-
-    size: str
-    memory: int
-
-
 class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  # type: ignore[misc]
     """Base of the regressors: mean and log-variance of standardised outputs.
 
@@ -85,8 +126,6 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
     """
 
     type_name: ClassVar[str]
-    #: Allowed values of hyperparameters that are words.
-    choices: ClassVar[dict[str, tuple[str, ...]]] = {}
 
     x_scaling_: Standardisation
     y_scaling_: Standardisation
@@ -176,20 +215,9 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
         outputs = self._standardised_outputs(self.x_scaling_.apply(X))
         return self.head_.to_original_units(*outputs, return_std)
 
-    def requirements(self, rows: int, inputs: int, outputs: int) -> Requirements | None:
-        """What a fit to so many rows takes; None where that is little."""
-        return None
-
     def fitted_settings(self) -> str:
         """Size and chosen hyperparameters of the fitted regressor, for the model card."""
         return ""
-
-    def learning_curve_parameters(self) -> dict[str, Any] | None:
-        """Hyperparameters that stay fixed when it is fitted again to fewer rows.
-
-        None where fitting again takes too long for a learning curve.
-        """
-        return {}
 
 
 @dataclass(frozen=True)

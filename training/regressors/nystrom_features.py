@@ -3,20 +3,40 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from soilml.arrays import Floats
-from training.regressors.ordered_threads import Progress, ordered_map, thread_count
-from training.regressors.rbf_expansion import rbf
-from training.regressors.row_groups import MOST_FOLDS, Groups
+from soilml.processes import usable_cores
+from training.regressors.gaussian_regressor import Groups, Progress
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 #: Rows that centres are selected from, at least and for each centre; and exchanges per centre.
 CANDIDATES, CANDIDATES_PER_CENTRE = 4000, 10
 TRIALS_PER_CENTRE = 30
+
+
+def rbf(a: Floats, b: Floats, width: float) -> Floats:
+    r"""Kernel matrix (len(a), len(b)), `exp(-|a - b|^2 / (2 width^2))`."""
+    squared = (a * a).sum(axis=1)[:, None] + (b * b).sum(axis=1)[None, :] - 2.0 * (a @ b.T)
+    return np.asarray(np.exp(-np.maximum(squared, 0.0) / (2.0 * width * width)))
+
+
+def median_distance(x: Floats) -> float:
+    """Median distance between rows (n, d), of at most 400 of them: the unit of kernel widths."""
+    sample = x[np.random.default_rng(0).permutation(len(x))[:400]]
+    distance = np.sqrt(((sample[:, None, :] - sample[None, :, :]) ** 2).sum(axis=-1))
+    pairs = np.triu_indices(len(sample), 1)
+    median = float(np.median(distance[pairs])) if len(sample) > 1 else 1.0
+    return median if median > 0.0 else 1.0
 
 
 def select_by_renyi_entropy(x: Floats, count: int, width: float, seed: int) -> NDArray[np.int64]:
@@ -223,8 +243,10 @@ class FoldedRidge:
         return moments, means
 
 
-def streaming_bytes(prototypes: int) -> int:
-    """Memory of the chunks of all threads, and of matrices of the prototypes."""
-    threads = thread_count()
-    chunks = (3 * threads + threads + 2) * CHUNK * prototypes  # at work, and waiting to be used
-    return 8 * (chunks + (2 * threads + 8 + 2 * MOST_FOLDS) * prototypes**2)
+def ordered_map(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+    """Results of a function of each item, in order, in one thread for each usable core.
+
+    Each call uses one thread of linear algebra, which releases the interpreter's lock.
+    """
+    with threadpool_limits(1), ThreadPoolExecutor(usable_cores()) as pool:
+        return list(pool.map(function, items))

@@ -33,8 +33,7 @@ from training.set_posterior.draws import (
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.likelihood import Likelihood, Linear
-from training.set_posterior.misfit_test import MisfitLimits, add_consistency
-from training.set_posterior.posterior_summary import add_posterior_outputs
+from training.set_posterior.posterior_summary import MisfitLimits, add_posterior_outputs
 from training.set_posterior.residual_system import add_residual_rows
 from training.set_posterior.response_surface import Response
 from training.set_posterior.row_inputs import FileNoise, complete_inputs, default_values
@@ -133,13 +132,13 @@ class SetPosteriorGraph:
         inputs = {name: Value(graph, name) for name in names}
         positive = [name for name, (least, _) in self.family.limits().items() if least > 0.0]
         inputs = complete_inputs(inputs, of_set, self.noise, positive)
-        context, rows = add_residual_rows(self.family, self.response, inputs)
+        rows = add_residual_rows(self.family, self.response, inputs)
         state, counts = (inputs[name] for name in MEMORY_INPUTS)
         outputs = [prefix + name for name in MEMORY_OUTPUTS]
         counts = (counts + rows.counts).named(outputs[1])
         rows.in_range.node("Identity").named(prefix + ROW_IN_RANGE)
 
-        family, terms, std = self.family, self.response.terms, context.axis_std
+        family, terms, std = self.family, self.response.terms, rows.context.axis_std
         nearly = None if std is None else Linear.of(terms, family.free, std)
         axes = family.axes[: family.free]
         usual = family.model_errors()
@@ -148,14 +147,14 @@ class SetPosteriorGraph:
             polynomials, rows, state, inputs[MODEL_ERROR_INPUT], self.scales,
             tuple(usual[name] > 0.0 for name in MODEL_ERROR_COLUMNS), nearly,
         )  # fmt: skip
-        consistency = add_consistency(counts, self.limits)
+        consistency = self.limits.of_set(counts)
         sizes = SIZES_SMALL if self.small else sample_sizes(len(axes))
         *sample, grown = likelihood.sampled(
             sizes, prior_draws(graph, axes, polynomials.order, sizes.prior),
-            adapted_draws(graph, polynomials.unknowns, sizes.adapted), consistency.limit,
+            adapted_draws(graph, polynomials.unknowns, sizes.adapted), consistency[0],
             family.targets,
         )  # fmt: skip
         grown.node("Identity").named(outputs[0])
         add_posterior_outputs(
-            family, polynomials.order, context, sample, consistency, prefix, self.small
+            family, polynomials.order, rows.context, sample, consistency, prefix, self.small
         )

@@ -30,7 +30,7 @@ from training.set_posterior.error_scales import ErrorScales
 from training.set_posterior.monomials import ONE, Terms, derivative
 from training.set_posterior.residual_system import ResidualRows
 from training.set_posterior.sampler import Polynomials, adapted_rounds, first_round
-from training.set_posterior.scale_mixture import integrate_out, judged_first, scale_mixture
+from training.set_posterior.scale_mixture import integrate_out, scale_mixture
 
 #: Columns of errors in the residual system: of the sensors, and of the model.
 OF_SENSORS, OF_MODEL = len(SENSOR_ERROR_COLUMNS), len(MODEL_ERROR_COLUMNS)
@@ -182,7 +182,7 @@ class Likelihood:
             "terms": self.size.indices(polynomials.rows),
             "tilts": constant(graph, polynomials.tilts, name="tilts"),
         }
-        of_columns, probabilities = judged_first(self.scales)
+        of_columns, probabilities = self.scales.judged_first()
         present = np.flatnonzero(self.present)
         of_scales = {
             "present": self.size.indices(present),

@@ -1,7 +1,9 @@
-"""Polynomials of several coordinates, of low total degree."""
+"""Polynomials of several coordinates of low total degree, and the terms of a small file."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -67,3 +69,38 @@ def pair_factors(terms: Terms) -> list[tuple[tuple[int, int], ...]]:
     length = max(4, len(terms[0]) + len(terms[0]) % 2)
     padded = [(ONE,) * (length - len(term)) + term for term in terms]
     return [tuple((term[i], term[i + 1]) for i in range(0, length, 2)) for term in padded]
+
+
+def select_terms(x: Floats, y: Floats, terms: Terms, count: int) -> Terms:
+    r"""The `count` terms that are left when the least useful one is taken out again and again.
+
+    The least useful term is that whose removal raises the squared error of the least-squares
+    polynomials least. With the coefficients beta of a fit with basis B, it raises it by
+
+    .. math:: \frac{\sum \beta_j^2}{[(B^T B)^{-1}]_{jj}}
+
+    Constant and linear terms stay, and a term stays as long as it divides another one, so that the
+    derivatives of all terms are multiples of terms.
+
+    x: Points (m, p) of the unknowns.
+    y: Values (m, k) of all responses there, each divided by what an error of it weighs.
+
+    References: Miller, Subset Selection in Regression, 2002, section 3.3 (backward elimination).
+    """
+    kept = list(terms)
+    while len(kept) > count:
+        basis = monomials(x, tuple(kept))
+        inverse = np.linalg.inv(basis.T @ basis)
+        cost = ((inverse @ (basis.T @ y)) ** 2).sum(axis=1) / np.diag(inverse)
+        free = [i for i, term in enumerate(kept) if _may_go(term, kept)]
+        kept.pop(min(free, key=lambda i: float(cost[i])))
+    return tuple(kept)
+
+
+def _may_go(term: tuple[int, ...], kept: Sequence[tuple[int, ...]]) -> bool:
+    """Whether a term is of second degree or more and divides no other."""
+    own = Counter(term)
+    del own[ONE]
+    if own.total() < 2:
+        return False
+    return not any(other != term and own <= Counter(other) for other in kept)

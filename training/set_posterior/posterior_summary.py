@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from soilml.arrays import Floats
 from soilml.onboard.estimate import EDGE_STDS
-from soilml.onboard.set_contract import SET_PREFIX
+from soilml.onboard.set_contract import LEAST_SHARE_IN_RANGE, SET_PREFIX
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from training.onnx_graph.value import (
     Value,
@@ -24,7 +25,6 @@ from training.onnx_graph.value import (
     where,
 )
 from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
-from training.set_posterior.misfit_test import Consistency
 
 INTERVAL = (0.05, 0.95)  # Probabilities of the ends of the interval
 #: Distances from the mean, in standard deviations, at which the distribution function is evaluated.
@@ -36,6 +36,40 @@ DISTANCES = np.arange(0.5, 3.3, SPACING)
 #: Largest sum of squared weights that is taken into account: one point alone has 1.
 LARGEST_SHARE = 0.95
 LEAST_SHARE = 1e-6  # Least share of the sample between two grid points that is divided by
+
+
+#: The limit beyond the largest calibrated number of readings n grows by 1 + 3 / sqrt(n) a reading:
+#: that of a chi-squared distribution with n degrees of freedom is n + 3 sqrt(n) to 3 standard
+#: deviations, roughly, and a straight line through it lies above it.
+CHI_SQUARED_MARGIN = 3.0
+
+
+@dataclass(frozen=True)
+class MisfitLimits:
+    """Largest accepted misfit of a set by number of readings, both rising."""
+
+    readings: Floats
+    misfit: Floats
+
+    def of_set(self, counts: Value) -> tuple[Value, Value]:
+        """Largest misfit of sound sets, and whether rows suffice, (1,) each, as nodes of a graph.
+
+        The limit is linear in the logarithm of the number of readings between the calibrated
+        numbers. There must be readings, and at least half of the rows in range.
+
+        counts: Readings in the system, rows, and rows in range, (3,): whole numbers.
+        """
+        readings, rows, rows_in_range = counts.split([1, 1, 1], axis=0)
+        last = int(self.readings[-1])
+        numbers = np.maximum(np.arange(last + 1), self.readings[0])
+        table = np.interp(np.log(numbers), np.log(self.readings), self.misfit)
+        place = readings.clip(0.0, float(last)).astype(np.int32)
+        interpolated = constant(counts.graph, table).node("Gather", place)
+        beyond = maximum(readings - float(last), 0.0)
+        limit = interpolated + beyond * (1.0 + CHI_SQUARED_MARGIN / np.sqrt(last))
+        enough_in_range = rows_in_range >= rows * LEAST_SHARE_IN_RANGE
+        any_reading = readings > 0.5  # a count in float32
+        return limit, enough_in_range & any_reading
 
 
 def add_quantiles(deviations: Value, std: Value, weights: Value) -> Value:
@@ -106,7 +140,7 @@ def add_posterior_outputs(
     order: tuple[int, ...],
     context: ContextValues,
     sample: Sequence[Value],
-    consistency: Consistency,
+    consistency: tuple[Value, Value],
     prefix: str,
     few_points: bool = False,
 ) -> None:
@@ -120,6 +154,7 @@ def add_posterior_outputs(
 
     order: Of the axes in the points.
     sample: Points (1 + p, n), weights (1, n) with sum 1, and least misfit (1,).
+    consistency: Of `MisfitLimits.of_set`.
     few_points: Whether the covariance also has the error of a mean of few points, see
         `variance_of_few_points`.
     """
@@ -138,8 +173,8 @@ def add_posterior_outputs(
         root = sqrt(factor)
         covariance, std, interval = covariance * factor, std * root, interval * root
     interval = mean + interval
-    enough = consistency.enough
-    consistent = enough & (misfit <= consistency.limit)
+    limit, enough = consistency
+    consistent = enough & (misfit <= limit)
     consistent = consistent.named(f"{prefix}{SET_PREFIX}in_range")
     prior, scale = prior_summary(family), context.target_scale
     names = ("mean", "std", "low", "high")

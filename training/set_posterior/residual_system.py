@@ -2,31 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from soilml.onboard.set_contract import OPERATING_NOISE, OPERATING_STD_INPUTS, RESPONSE_CHANNELS
+from soilml.onboard.set_contract import (
+    LAW_ERROR_COLUMNS,
+    MODEL_ERROR_COLUMNS,
+    MODEL_ERROR_INPUT,
+    OPERATING_NOISE,
+    OPERATING_STD_INPUTS,
+    RESPONSE_CHANNELS,
+)
 from training.onnx_graph.value import (
     Value,
     absolute,
     concat,
     constant,
+    exp,
     gemm,
     log,
     maximum,
     sqrt,
 )
+from training.set_posterior.error_scales import OF_CHANNELS
+from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
     ContextValues,
     WheelFamily,
 )
-from training.set_posterior.model_errors import ModelErrors
+from training.set_posterior.monomials import ONE, Terms, derivative
 from training.set_posterior.response_surface import Response, ResponseValues
-from training.set_posterior.sensor_errors import OperatingReadings, SensorErrors
 
+CHANNELS = len(RESPONSE_CHANNELS)
 #: Tolerance of the box of features, as a share of its width: float32 rounds readings at its ends.
 BOX_TOLERANCE = 1e-3
 #: Rows that are out of range by up to so many standard deviations of slip or load are left out, but
@@ -35,6 +46,9 @@ NOISE_MARGIN = 3.0
 #: Drawbar pull over load, which has no logarithm, may have any noise; absent readings have far
 #: more.
 MOST_PULL_NOISE = 1e3
+FRICTION = "friction_angle"
+STRENGTH, MODULUS = ("cohesion", FRICTION), ("shear_modulus",)  # Unknowns of the shear strength
+GROWS = "_by_slip"  # End of the names of errors that grow with slip
 
 
 @dataclass(frozen=True)
@@ -49,11 +63,17 @@ class ResidualRows:
     is one channel of one row: so they are joined without a copy of each.
     """
 
+    family: WheelFamily
+    response: Response
+    context: ContextValues
+    readings: dict[str, Value]  # readings and standard deviations by input name
+    operating: Value  # (2, rows) slip and load, at least `SMALLEST`
+    operating_noise: Value  # (2, rows) of their logarithms
+    y: Value  # (channels, rows) readings on the scales of the channels
+    slope: Value  # (channels, rows) derivatives of these scales by the readings
     weight: Value  # (1, readings), 0 for readings that are left out
     used: Value  # (readings,) whether a reading takes part
     values: ResponseValues  # the response surface at the rows, unweighted
-    sensor_errors: SensorErrors
-    model_errors: ModelErrors
     in_range: Value  # (rows,) whether the features lie in the range of the response surface
     counts: Value  # (3,) float32: readings in the system, rows, rows in range within their noise
 
@@ -69,20 +89,118 @@ class ResidualRows:
             is then without columns of errors of the model.
         """
         slopes = self.values.slopes_at(basis)
-        of_residuals, coefficients = (
-            self.sensor_errors.of_residuals(slopes),
-            self.values.coefficients,
-        )
-        parts = [coefficients, self.sensor_errors.common_columns(of_residuals)]
+        of_residuals = self._slopes_of_residuals(slopes)
+        parts = [self.values.coefficients, self._sensor_columns(of_residuals)]
         if basis is not None:
-            parts.append(self.model_errors.columns_at(slopes, coefficients, basis))
+            parts.append(self._model_columns(slopes, basis))
         system = concat(parts, axis=0) * self.weight
-        return self.sensor_errors.whitened(system, of_residuals, self.weight)
+        noise = self.operating_noise.reshape(2, 1, -1)
+        return whiten_rows(system, (of_residuals * noise).reshape(2, -1) * self.weight)
+
+    def _slopes_of_residuals(self, slopes: Value) -> Value:
+        r"""Derivatives (2, channels, rows) of residuals by log slip and log load.
+
+        The reading of slip is s + e. The residual of channel k, :math:`f_k(s + e) - y_k`, changes
+        by :math:`f_k' e`. An error of load changes torque over load and drawbar pull over load as
+        well: with the relative error e of load, the residuals of the three channels change by
+        :math:`(f_1' + 1) e`, :math:`f_2' e` and :math:`(f_3' + f_3) e`, with f' the derivatives by
+        the logarithm of load.
+
+        slopes: Derivatives (2, channels, rows) of the channels at a soil.
+        """
+        torque, pull = np.zeros((2, 2, CHANNELS, 1))
+        torque[1, 0], pull[1, 2] = self.context.torque_by_load, 1.0
+        return slopes + (self.y * pull + torque)
+
+    def _sensor_columns(self, slopes: Value) -> Value:
+        """Columns (errors, readings) of errors of the sensors, by slopes of the residuals."""
+        slip, load = self.operating.split(2, axis=0)
+        shared = [self.readings["slip_bias"] / slip, self.readings["load_gain"] + load * 0.0]
+        of_operating = slopes * concat(shared, axis=0).reshape(2, 1, -1)
+        readings = self.readings
+        none = readings["load"] * 0.0
+        stds = [readings["torque_bias"]]
+        stds += [readings[f"{name}_bias"] + none for name in RESPONSE_CHANNELS[1:]]
+        offsets = concat([*stds, readings["torque_gain"] * readings["torque"]], axis=0)
+        # row k has the offset of channel k; the last has the gain of torque
+        channel_of_row = np.eye(CHANNELS + 1, CHANNELS)[..., None]
+        channel_of_row[-1, 0] = 1.0
+        scale = self.slope * channel_of_row
+        of_channels = scale * offsets.reshape(CHANNELS + 1, 1, -1)
+        return concat([of_channels.reshape(CHANNELS + 1, -1), of_operating.reshape(2, -1)], axis=0)
+
+    def _model_columns(self, slopes: Value, basis: Value) -> Value:
+        r"""Columns (errors, readings) at a soil, in the order of `MODEL_ERROR_COLUMNS`.
+
+        Changes with the bearing modulus k follow from those with load W and cohesion c. On a soil
+        that is stronger by some factor, under a load that is larger by the same factor, T / W,
+        sinkage and P / W are what they were, for every law of stress in which strength is c, k or a
+        multiple of them:
+
+        .. math:: \frac{\partial f}{\partial \ln k} =
+            - \frac{\partial f}{\partial \ln W} - \frac{\partial f}{\partial \ln c}
+
+        A scale of torque without load changes with the logarithm of torque itself in addition.
+        The strength is cohesion and the tangent of the friction angle. They are of usual size,
+        and zero where the model is right.
+
+        slopes: Derivatives of the channels by log slip and log load, at the same soil, (2,
+            channels, rows).
+        basis: Monomials (terms, 1) of the soil.
+        """
+        stds, slope = self.family.model_errors(), self.slope
+        slip, load, torque = (self.readings[name] for name in ("slip", "load", "torque"))
+        log_load = log(maximum(load, SMALLEST)) - self.context.reference_log_load
+        bearing = [
+            slip * 0.0 + stds["bearing"],
+            slip * stds["bearing_by_slip"],
+            log_load * stds["bearing_by_load"],
+        ]
+        profile = concat(bearing, axis=0).reshape(3, 1, -1)
+        first = np.zeros((CHANNELS, 1))
+        first[0] = 1.0
+        of_torque = first * (1.0 - self.context.torque_by_load)
+        change = slope * torque * of_torque - slopes.take([1], axis=0)  # (1, channels, rows)
+        of_strength, of_modulus = (self._by_logarithms(n, basis) for n in (STRENGTH, MODULUS))
+        change = change - self._by_logarithms(STRENGTH[:1], basis)
+        contact = change * 0.0
+        if self.response.contact is not None:
+            at_soil = self.response.contact.add_at_soil(self.context.features, basis)
+            contact = at_soil.reshape(1, CHANNELS, -1) * stds["contact"]
+        # relative errors (errors, channels, rows) of single channels; of pull, over load
+        names = MODEL_ERROR_COLUMNS[OF_CHANNELS : -len(LAW_ERROR_COLUMNS)]
+        constant_part, growing = np.zeros((2, len(names), CHANNELS, 1))
+        for number, name in enumerate(names):
+            part = growing if name.endswith(GROWS) else constant_part
+            part[number, RESPONSE_CHANNELS.index(name.removesuffix(GROWS))] = stds[name]
+        own = (slope * torque * first + (1.0 - first)) * (slip * growing + constant_part)
+        laws = [
+            of_strength * stds["strength"],
+            of_strength * (log_load * stds["strength_by_load"]).reshape(1, 1, -1),
+            of_modulus * stds["shear_modulus"],
+        ]
+        columns = concat([change * profile, contact, own, *laws], axis=0)
+        size = self.readings[MODEL_ERROR_INPUT]
+        some = (size * size > 0.0).astype(np.float32)
+        return columns.reshape(len(MODEL_ERROR_COLUMNS), -1) * some
+
+    def _by_logarithms(self, names: Sequence[str], basis: Value) -> Value:
+        """Sum (1, channels, rows) of the changes with the logarithms of these unknowns.
+
+        Nil where the family has none of them.
+        """
+        by_log = basis * 0.0
+        axes = {axis.name: number for number, axis in enumerate(self.family.axes)}
+        for number in (axes[name] for name in names if name in axes):
+            axis = self.family.axes[number]
+            by_log = by_log + _by_log_value(basis, self.response.terms, number + 1, axis)
+        change = gemm(by_log, self.values.coefficients, transpose_a=True)
+        return change.reshape(1, CHANNELS, -1)
 
 
 def add_residual_rows(
     family: WheelFamily, response: Response, readings: dict[str, Value]
-) -> tuple[ContextValues, ResidualRows]:
+) -> ResidualRows:
     r"""Residuals of the three channels of each row, as polynomials of the unknowns.
 
     .. math:: e_k(x) = \frac{\sum_j a_{kj} b_j(x) - y_k}{\sqrt{\sigma_k^2 + \epsilon_k^2}}
@@ -94,7 +212,12 @@ def add_residual_rows(
     readings: Readings and standard deviations (1, rows), and inputs of the whole set (1,), by name.
     """
     context = family.add_context(readings)
-    operating, outside = _operating(readings), _outside(response, context.features)
+    operating = maximum(concat([readings[name] for name in OPERATING_NOISE], axis=0), SMALLEST)
+    stds = concat([readings[name] for name in OPERATING_STD_INPUTS], axis=0)
+    operating_noise = stds / operating
+    middle = 0.5 * (response.upper + response.lower)[:, None]
+    features = context.features
+    outside = absolute(features - constant(features.graph, middle, name="range_middle"))
     within = _all_below(response, outside)  # (rows,) float32
     in_range = within.astype(np.bool_)
     one = constant(outside.graph, 1.0)
@@ -109,37 +232,18 @@ def add_residual_rows(
     used = (noise < most_noise).astype(np.float32) * within  # (channels, rows)
     weight = used / sqrt(noise * noise + response.error[:, None] ** 2)
     used = used.reshape(-1)
-    values = response.add_to(context.features, y, context.feature_slopes)
+    values = response.add_to(features, y, context.feature_slopes)
     # rows may be out of range by their noise: a slip at the end of the range is so half the time
     margin = -NOISE_MARGIN * np.abs(context.feature_slopes.T)
-    outside_noise = gemm(constant(outside.graph, margin), operating.relative_noise, outside)
+    outside_noise = gemm(constant(outside.graph, margin), operating_noise, outside)
     counts = [
         used.sum(),
         in_range.node("Shape").astype(np.float32),
         _all_below(response, outside_noise).sum(),
     ]
-    return context, ResidualRows(
-        weight=weight.reshape(1, -1),
-        used=used.astype(np.bool_),
-        values=values,
-        sensor_errors=SensorErrors(context, readings, operating, y, slope),
-        model_errors=ModelErrors(family, response, context, readings, slope),
-        in_range=in_range,
-        counts=concat(counts, axis=0),
-    )
-
-
-def _operating(readings: dict[str, Value]) -> OperatingReadings:
-    """Slip and load, and their noise."""
-    values = maximum(concat([readings[name] for name in OPERATING_NOISE], axis=0), SMALLEST)
-    stds = concat([readings[name] for name in OPERATING_STD_INPUTS], axis=0)
-    return OperatingReadings(values, stds, stds / values)
-
-
-def _outside(response: Response, features: Value) -> Value:
-    """Distances (f, rows) of features from the middle of the designs of the response surface."""
-    middle = 0.5 * (response.upper + response.lower)[:, None]
-    return absolute(features - constant(features.graph, middle, name="range_middle"))
+    read = (readings, operating, operating_noise, y, slope)
+    system = (weight.reshape(1, -1), used.astype(np.bool_), values, in_range)
+    return ResidualRows(family, response, context, *read, *system, concat(counts, axis=0))
 
 
 def _all_below(response: Response, distance: Value) -> Value:
@@ -152,3 +256,44 @@ def _all_below(response: Response, distance: Value) -> Value:
         np.float32
     )
     return inside.reduce("ReduceMin", axis=0, keepdims=False)
+
+
+def _by_log_value(basis: Value, terms: Terms, number: int, axis: PriorAxis) -> Value:
+    r"""Derivatives (terms, 1) of the monomials by the logarithm of one unknown, at a soil.
+
+    .. math:: \frac{\partial b}{\partial \ln \theta} = D b \, \frac{\theta}{d\theta / dx}
+
+    Of a friction angle it is the logarithm of its tangent, with sin(theta) cos(theta) for theta.
+    """
+    linear = terms.index((*(ONE,) * (len(terms[0]) - 1), number))
+    x = basis.take([linear], axis=0)
+    growth = exp(x * axis.rate) * axis.factor
+    value = growth + x * axis.slope + axis.shift
+    by_x = growth * axis.rate + axis.slope
+    if axis.name == FRICTION:
+        value = value.node("Sin") * value.node("Cos")
+    return basis.derived(derivative(terms, number)) * (value / by_x)
+
+
+def whiten_rows(system: Value, of_row: Value) -> Value:
+    r"""A system (columns, readings) with errors of each row (errors, readings) integrated out.
+
+    With g the changes of the residuals of one row with an error that has a normal prior with
+    standard deviation 1, the covariance of these residuals is I + g g^T. They are whitened by its
+    symmetric square root S:
+
+    .. math:: I + g g^T = S S^T, \qquad A' = S^{-1} A = A - \frac{g}{\kappa} (g^T A), \qquad
+        \kappa = 1 + g^T g + (1 + g^T g)^{1/2}
+
+    Several errors are integrated out one after another: the columns of the others are whitened as
+    the rest of the system is.
+    """
+    system, *errors = (part.reshape(0, CHANNELS, -1) for part in (system, *of_row.split(2, axis=0)))
+    while errors:
+        g = errors.pop()
+        determinant = g.sum_of_squares(axis=1, keepdims=True) + 1.0
+        scaled = g / (determinant + sqrt(determinant))
+        system, *errors = (
+            part - scaled * (g * part).sum(axis=1, keepdims=True) for part in (system, *errors)
+        )
+    return system.reshape(0, -1)

@@ -15,13 +15,12 @@ from soilml.errors import InputError
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from soilml.processes import process_map
 from training.onnx_graph.value import Value, concat, constant, gemm, tanh
-from training.regressors.standardisation import Standardisation
+from training.regressors.gaussian_regressor import Standardisation
 from training.regressors.tanh_network import TanhNetwork, evaluate_layers, one_cycle_rate
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 from training.set_posterior.families.coordinates import prior_points
 from training.set_posterior.families.wheel_family import WheelFamily
-from training.set_posterior.monomials import Terms, monomial_terms, monomials
-from training.set_posterior.term_selection import select_terms
+from training.set_posterior.monomials import Terms, monomial_terms, monomials, select_terms
 
 Progress = Callable[[str, int, int], None]
 

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from soilml.arrays import Floats
 from training.onnx_graph.value import (
     Value,
     composite,
@@ -95,7 +94,7 @@ def scale_mixture(
     present: Which of `MODEL_ERROR_COLUMNS` the model can have, of which the errors are.
     """
     sizes = np.flatnonzero(present)
-    of_columns, probabilities = judged_first(scales)
+    of_columns, probabilities = scales.judged_first()
     factors = where(size < 0.0, constant(system.graph, of_columns[:, None, sizes]), size)
     whole = system.node("Unsqueeze", system.indices([0]))
     copies = whole * np.ones((len(probabilities), 1, 1))
@@ -108,12 +107,6 @@ def scale_mixture(
         determinants.append(determinant)
     log_determinant = log(concat(determinants, axis=1)).sum(axis=1, keepdims=False)
     return Scaled(systems, np.log(probabilities)[:, None] - log_determinant * 0.5)
-
-
-def judged_first(scales: ErrorScales) -> tuple[Floats, Floats]:
-    """Multiples by column (scales, errors) and probabilities (scales,), the judged scale first."""
-    order = np.argsort(np.arange(len(scales.scales)) != scales.judged, kind="stable")
-    return scales.of_columns[order], scales.probabilities[order]
 
 
 def _without_last_of_scales(systems: Value) -> list[Value]:

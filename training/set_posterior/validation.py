@@ -25,8 +25,7 @@ from soilml.processes import process_map
 from training.onnx_graph.builder import Graph, session_of
 from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.misfit_test import MisfitLimits
-from training.set_posterior.posterior_summary import INTERVAL, prior_summary
+from training.set_posterior.posterior_summary import INTERVAL, MisfitLimits, prior_summary
 from training.set_posterior.response_surface import Response
 
 Progress = Callable[[str, int, int], None]

@@ -5,16 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.option_values import NumberFrom, slip_limit, whole_number_from
-from soilml.cli.options import (
-    add_effects_option,
-    add_exact_model_option,
-    add_gravity_options,
-    add_model_and_runs,
-    add_output,
-    add_row_options,
-    gravity_change,
-)
+from soilml.cli.option_values import SLIP, NumberFrom, whole_number_from
+from soilml.cli.options import OutputFile, gravity_change
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,20 +24,14 @@ MODEL.toml.
   soilml plan next MODEL.toml RUNS.csv --slip 0.1,0.3,0.5 --load 30:120:4
   soilml plan next MODEL.toml --load 30:120:4 --picture map.png
 
-For each candidate, readings are simulated for samples of the soil, averaged
-over explanations of the rows as by soilml identify (of the prior without
-RUNS.csv), and the standard deviation that is left is averaged over them.
-<parameter>_left is this expected standard deviation divided by that of the
-prior (1: nothing learned). The rows of the table are: the best candidate for
-all parameters together and for each parameter, the best
-repetition of a measured row, and the best sequence of --count rows, whose
-widths are those after all rows up to it. --all lists every candidate instead.
+<parameter>_left is the standard deviation that is expected after a row, divided
+by that of the prior (1: nothing learned), over soils drawn as by soilml
+identify. Rows are the best candidate for all parameters together and for each,
+the best repetition of a measured row, and the best sequence of --count rows.
 
 Candidate channels are those whose noise is declared in [noise]: torque alone,
 and torque with each other channel. Without --load, loads from half to twice
-the measured ones are tried. A point is excluded where a twentieth or more of
-the posterior samples does not carry the wheel. Model errors are considered where
-[discrepancy] declares them or [remainder] has them.
+the measured ones are tried.
 
 With --gravity, rate tests made where --tested-at says (on Earth) by what they
 reveal of the drawbar pull of the wheel there, under --target-load:
@@ -53,11 +39,9 @@ reveal of the drawbar pull of the wheel there, under --target-load:
   soilml plan next MODEL.toml --gravity moon --target-load 20 --radius 0.1,0.15
 
 A test has rows at all --slip under a load, with a wheel of a radius.
-pull_left_N is the standard deviation of the pull that is expected after it, by
-the model, with the law of gravity in doubt; scaled_error_N is the error of the
-measured pull times the ratio of the loads, without a model. speed_ratio is the
-speed of the test over that there at equal Froude number. Beside the best tests
-stand those of the same load and of the same mass.
+pull_left_N is the standard deviation of the pull that is expected after it,
+with the law of gravity in doubt; scaled_error_N that of scaling by the loads,
+without a model. speed_ratio is at equal Froude number.
 """
 #: Largest number of rows planned in a sequence, and of operating points (slips times loads).
 MAX_COUNT, MAX_POINTS = 5, 1000
@@ -72,60 +56,36 @@ TRANSFER = {
 }
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add_model_and_runs(parser, need_runs=False)
-    parser.add_argument(
-        "--slip",
-        dest="slips",
-        metavar="S,...",
-        help="candidate slips: A,B,... or start:stop:count",
-    )
-    parser.add_argument("--load", dest="loads", metavar="N,...", help="candidate loads in N")
-    parser.add_argument(
-        "--count",
-        type=whole_number_from(1, MAX_COUNT),
-        metavar="N",
-        help="number of rows in the planned sequence, 1 to 5 (default: 3)",
-    )
-    parser.add_argument(
-        "--free", metavar="A,B,...", help="parameters to identify (default: those with a prior)"
-    )
-    parser.add_argument("--all", action="store_true", help="list every candidate, best first")
-    add_gravity_options(parser)
-    parser.add_argument(
-        "--target-load",
-        type=NumberFrom(1e-3, 1e6, "N"),
-        metavar="N",
-        help="with --gravity: load of the wheel there (default: mean of [rover])",
-    )
-    parser.add_argument(
-        "--target-slip", type=slip_limit, metavar="S", help="slip of the pull there (default: 0.3)"
-    )
-    parser.add_argument("--radius", metavar="M,...", help="further wheel radii of tests in m")
-    add_effects_option(parser)
-    add_exact_model_option(parser)
-    add_row_options(parser)
-    add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_output(
-        parser, "--picture", "FILE.png", "draw maps of the expected width over slip and load"
-    )
+ARGUMENTS = (
+    "model-and-any-runs",
+    ("--slip S,...", "candidate slips: A,B,... or start:stop:count"),
+    ("--load N,...", "candidate loads in N"),
+    ("--count N", "rows of the planned sequence (default: 3)", whole_number_from(1, MAX_COUNT)),
+    "free",
+    ("--all", "list every candidate, best first"),
+    "gravity",
+    ("--target-load N", "of the wheel there (default: [rover])", NumberFrom(1e-3, 1e6, "N")),
+    ("--target-slip S", "slip of the pull there (default: 0.3)", SLIP),
+    ("--radius M,...", "further wheel radii of tests in m"),
+    "effects",
+    "exact-model",
+    "rows",
+    ("--out FILE.csv", "write the table to this file", OutputFile),
+    ("--picture FILE.png", "draw maps of the expected width over slip and load", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:
     """Rate all candidates and write the table."""
-    from functools import partial
-
     import numpy as np
 
     from soilml.cli.option_values import parse_names, parse_numbers
     from soilml.cli.options import available_effects
-    from soilml.cli.output import save_columns, show_rows, tell, write_columns, write_set
+    from soilml.cli.output import deliver, tell, write_columns
     from soilml.cli.progress import working
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.experiment_design import advise, candidate_grid
-    from soilml.experiment_design.advice_after_results import mean_covariates
-    from soilml.experiment_design.next_rows import COUNT, known_soil
+    from soilml.experiment_design.next_rows import COUNT, known_soil, mean_covariates
     from soilml.experiment_design.presentation import (
         advice_columns,
         best_rows,
@@ -146,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
     table = None if args.runs is None else read_rows(args, RUNS)
     slips, loads = (
         None if text is None else parse_numbers(option, text).tolist()
-        for option, text in (("--slip", args.slips), ("--load", args.loads))
+        for option, text in (("--slip", args.slip), ("--load", args.load))
     )
     case = read_case_of_rows(args, args.model, table, available_effects(args), with_bias=False)
     change = gravity_change(args, case)
@@ -192,9 +152,7 @@ def run(args: argparse.Namespace) -> int:
     if args.all:
         rows = [("candidate", c) for c in sorted(advice.choices, key=lambda c: c.overall)]
     columns = advice_columns(advice, rows)
-    write_set({args.out: partial(save_columns, columns), args.picture: report.pictures[0].save})
-    content = {name: np.asarray(values).tolist() for name, values in columns.items()}
-    show_rows(report, columns, content, args.out)
+    deliver(args, report, columns=columns)
     return 0
 
 

@@ -4,14 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.options import (
-    InputFile,
-    add_cost_option,
-    add_effects_option,
-    add_ignore_extra_option,
-    add_output,
-)
-from soilml.io.atomic_files import save_text
+from soilml.cli.options import InputFile, OutputFile
 
 FORMATS = ("table", "json")
 DESCRIPTION = """\
@@ -35,32 +28,27 @@ add are ranked by the effects that they gain per cost.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("model", type=InputFile, metavar="MODEL.toml", help="gear, soil and noise")
-    parser.add_argument(
-        "design", type=InputFile, metavar="DESIGN.csv", help="planned rows: CSV, Parquet or .xlsx"
-    )
-    parser.add_argument(
-        "--free", metavar="A,B,...", help="soil parameters to fit (default: those with a prior)"
-    )
-    add_output(parser, "--out", "FILE.json", "write the audit to this file")
-    add_cost_option(parser)
-    add_ignore_extra_option(parser)
-    add_effects_option(parser)
+ARGUMENTS = (
+    ("model MODEL.toml", "gear, soil and noise", InputFile),
+    ("design DESIGN.csv", "planned rows: CSV, Parquet or .xlsx", InputFile),
+    "free",
+    ("--out FILE.json", "write the audit to this file", OutputFile),
+    "cost",
+    "ignore-extra",
+    "effects",
+)
 
 
 def run(args: argparse.Namespace) -> int:
     """Audit and print or write."""
     from soilml.cli.option_values import parse_costs, parse_names
     from soilml.cli.options import available_effects
-    from soilml.cli.output import show_result, tell
+    from soilml.cli.output import deliver, tell
     from soilml.cli.progress import working
     from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case
     from soilml.fitting.covariance import ignored_discrepancy
     from soilml.gap import audit
-    from soilml.report.page import json_text
 
     design = read_long_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
     costs = parse_costs(args)
@@ -68,9 +56,7 @@ def run(args: argparse.Namespace) -> int:
     case = read_case(args.model, effects, with_explanations=True)
     with working(f"auditing {len(design)} rows"):
         found = audit(case, design, free=parse_names(args.free), effects=effects, costs=costs)
-    if args.out is not None:
-        save_text(args.out, json_text(found.as_json()))
-    show_result(found.report(), found.as_json())
+    deliver(args, found.report(), found.as_json())
     for line in ignored_discrepancy(case, "the audit", "effects are harder to name than it says"):
         tell(line.text)
     return 0

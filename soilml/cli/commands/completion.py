@@ -22,9 +22,7 @@ Print it again after an update of soilml, which may have other commands.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("shell", choices=("bash", "zsh", "fish"), help="bash, zsh or fish")
+ARGUMENTS = (("shell", "bash, zsh or fish", {"choices": ("bash", "zsh", "fish")}),)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -96,8 +94,4 @@ def _names(command: str, dest: str, metavar: str) -> Iterable[str]:
         from soilml.config.wheeled_rover import GRAVITY
 
         return GRAVITY
-    if dest == "rule":
-        from soilml.onboard.multi_sensor import ACROSS_FILES
-
-        return ACROSS_FILES
     return ("run", "gear") if dest == "by" else ()

@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from soilml.cli.option_values import NumberFrom, parse_names, whole_number_from
-from soilml.cli.options import InputFile, add_output, add_report_option
+from soilml.cli.options import InputFile, OutputFile
 
 if TYPE_CHECKING:
-    from soilml.report.page import Content
-    from soilml.rover_design.report import DesignReport
     from soilml.rover_design.study import DesignStudy
 
 FORMATS = ("table", "json")
@@ -37,92 +35,56 @@ number, a range that is searched, or { values = [...] }:
   radius = 0.09 # m
   width = [0.04, 0.12]
   lug_height = [0.0, 0.015]
-  # lug_count = 24
 
   [soil] # as in a model file; or published ones, each as likely
   names = ["ding2015/hit_lss1", "wang2016/kls1"]
-  # model = "model.toml" and runs = "runs.csv": the soil of measured rows
 
-  [goal]
+  [goal] # also margin, torque_limit, energy_limit, slip_limit, risk
   slope = "15 deg"
-  # margin = 5 (N), torque_limit = 2 (N m), energy_limit = 150 (J/m),
-  # slip_limit = 0.6, risk = 0.05, least = "width" (or energy, torque, ...)
+  least = "width" # or energy, torque, ...
 
-The best design is the one that meets the goal with the probability 1 - risk
-and has the least of `least`; where none does, it is the likeliest. The margin
-is the largest pull up to the slip limit less the weight along the slope. The
-front has the designs that no other one beats in both margin and `least`.
-goal_% is the probability of meeting the goal; p05 and p95 are the ends of
-the 90 % band; lugs_min is the number of lugs that a wheel needs.
-
-The result is JSON in SI units, in the file of --out or in a pipe; a terminal
-shows tables. --report writes a page to read and print.
+The best design meets the goal with the probability 1 - risk and has the least
+of `least`; where none does, it is the likeliest. The margin is the largest pull
+less the weight along the slope. The front has the designs that no other one
+beats in both margin and `least`.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "study", type=InputFile, metavar="ROVER.toml", help="rover, wheel, soil and goal"
-    )
-    parser.add_argument(
-        "--slope", type=NumberFrom(0.0, 60.0, "degrees"), metavar="DEG", help="slope in degrees"
-    )
-    parser.add_argument("--gravity", metavar="G", help="gravity: earth, moon, mars, or in m/s^2")
-    parser.add_argument("--soil", metavar="PAPER/SOIL,...", help="published soils, each as likely")
-    parser.add_argument(
-        "--risk", type=NumberFrom(0.001, 0.5), help="probability of failing that is accepted"
-    )
-    parser.add_argument(
-        "--designs",
-        type=whole_number_from(1, 100_000),
-        default=250,
-        metavar="N",
-        help="designs of the sweep (default: 250)",
-    )
-    parser.add_argument(
-        "--draws",
-        type=whole_number_from(50, 20_000),
-        default=1000,
-        metavar="N",
-        help="draws of soil and model error (default: 1000)",
-    )
-    parser.add_argument(
-        "--sweep-only", action="store_true", help="do not search between the designs of the sweep"
-    )
-    add_output(parser, "--out", "FILE.json", "write the result to this file")
-    add_output(parser, "--picture", "FILE.png", "draw contours, front and shares")
-    add_report_option(parser)
+ARGUMENTS = (
+    ("study ROVER.toml", "rover, wheel, soil and goal", InputFile),
+    ("--slope DEG", "slope in degrees", NumberFrom(0.0, 60.0, "degrees")),
+    ("--gravity G", "gravity: earth, moon, mars, or in m/s^2"),
+    ("--soil PAPER/SOIL,...", "published soils, each as likely"),
+    ("--risk P", "probability of failing that is accepted", NumberFrom(0.001, 0.5)),
+    ("--designs N (250)", "designs of the sweep", whole_number_from(1, 100_000)),
+    ("--draws N (1000)", "draws of soil and model error", whole_number_from(50, 20_000)),
+    ("--sweep-only", "do not search between the designs of the sweep"),
+    ("--out FILE.json", "write the result to this file", OutputFile),
+    ("--picture FILE.png", "draw contours, front and shares", OutputFile),
+    "report",
+)
 
 
 def run(args: argparse.Namespace) -> int:
     """Compare the designs and write the result."""
-    from soilml.cli.output import show_result, write_with_report
+    from soilml.cli.output import deliver
     from soilml.cli.progress import stage_progress
     from soilml.optional_imports import need
 
     need("scipy", "plan wheels")
-    from soilml.report.page import json_text
-    from soilml.rover_design.presentation import report_of_design
-    from soilml.rover_design.report import design_report
+    from soilml.rover_design import design
 
     study = _study(args)
     with stage_progress() as progress:
-        found: DesignReport = design_report(
+        found = design(
             study,
             designs=args.designs,
             draws=args.draws,
             optimise=not args.sweep_only,
             progress=progress,
         )
-    content = found.as_json()
-    report = report_of_design(found, f"Wheels for {Path(args.study).name}")
-    files: dict[str | None, Content] = {
-        args.out: json_text(content),
-        args.picture: report.pictures[0].save,
-    }
-    write_with_report(args, files, lambda: (report, content), study.soil.files)
-    show_result(report, content)
+    report = found.report(f"Wheels for {Path(args.study).name}")
+    deliver(args, report, found.as_json(), read=study.soil.files)
     return 0
 
 

@@ -39,14 +39,11 @@ USES = {
     "tornado": "serve",
     "tifffile": "map",
     "threadpoolctl": "gap, generate, train",
-    "dask": "generate --engine dask",
-    "distributed": "generate --engine dask",
 }
 NEEDED = ("numpy", "onnxruntime")  # The libraries without which nothing works
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
+ARGUMENTS = ()
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import InputFile, add_output, add_report_option, add_row_options
+from soilml.cli.options import OPTIONAL, REPEATED, InputFile, OutputFile
 from soilml.errors import InputError, TableError
 
 if TYPE_CHECKING:
@@ -20,99 +19,47 @@ if TYPE_CHECKING:
     from soilml.onboard.estimator import Estimator
     from soilml.remarks import Remark
 
-#: Names of `soilml.onboard.multi_sensor.ACROSS_FILES`, which takes a numerical library to import.
-FUSION_RULES = (
-    "correlated",
-    "prior-once",
-    "covariance-intersection",
-    "inverse-variance",
-    "pairwise",
-)
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
 Estimate soil parameters, or slip, with the model file MODEL.onnx. The results
 are those of the onboard runtime.
 
   soilml estimate exported/wheel.onnx
-  soilml estimate exported/wheel.onnx RUNS.csv --out estimates.csv
-  soilml estimate exported/wheel.onnx RUNS.csv --by run
+  soilml estimate exported/wheel.onnx RUNS.csv --by run --out estimates.csv
   soilml estimate exported/any_wheel.onnx RUNS.csv --model MODEL.toml --by run
   soilml estimate slip_torque.onnx RUNS.csv --with slip_vibration.onnx
 
 Without a table, one line says what the file is for: wheel, effects and priors.
 --model compares them with those of your model file, and refuses another wheel.
 
-Each row of the table gives mean, standard deviation (_std) and 90 % interval
-(_p05, _p95) of every parameter, and in_range. in_range is 0 where the readings
-lie outside the training data; the estimate is then the prior.
+Each row gives mean, standard deviation (_std) and 90 % interval (_p05, _p95) of
+every parameter, and in_range: 0 where the readings lie outside the training
+data; the estimate is then the prior. A single row is close to the prior. --by
+run pools all rows of a run, and --by all those of all runs, on one soil.
 
-One row gives one equation for three unknowns, so the estimate of a single row
-is close to the prior. --by run pools all rows of a run, which is far more
-accurate, and --by all those of all runs, which must then be on one soil.
 sinkage_m, drawbar_pull_N and <column>_std are used where the table has them,
-slip_std and load_N_std included. Rows out of range are set aside; the estimate
-of a run is the prior where they are more than half of its rows, and widened as
-far as the misfit says where no soil explains the others. The interval includes
-errors of the model of wheel and soil, whose size follows from the residuals of
-the run. --exact-model leaves them out, for a model that was checked on a known
-soil; a [discrepancy] or [remainder] of --model takes their place. With a file of
-a set posterior, disagrees is 1 where the rows of a run fit no exact model, as
-those of one sound run in a hundred: check units, sensors and wheel. A row with
-a blank reading, or whose status is not ok, gets a blank estimate. Slip differs
-from row to row and has no --by.
+slip_std and load_N_std included. The interval includes errors of the model,
+whose size follows from the residuals; --exact-model leaves them out. disagrees
+is 1 where the rows of a run fit no exact model: check units, sensors, wheel.
+A row with a blank reading, or whose status is not ok, gets a blank estimate.
 
---with fuses, row by row, model files that estimate the same parameters from
-other sensors: slip files of one data file by the correlation of their errors,
-others as if their errors were independent; files that read the same sensors
-are then refused. A file takes no part in a row where its reading is blank or
-out of range; the column `files` counts those that do. Standard error reports
-which parameters are not determined, and the next measurement that would help.
-Only numpy and onnxruntime are needed, but for --report, a page to read and
-print. CSV files are in SI units; a terminal shows kPa, degrees and mm.
+--with fuses, row by row, files that estimate the same parameters from other
+sensors; the column `files` counts those that took part. Only numpy and
+onnxruntime are needed, but for --report. CSV files are in SI units.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("trained", type=InputFile, metavar="MODEL.onnx", help="trained model file")
-    parser.add_argument(
-        "runs",
-        nargs="?",
-        type=InputFile,
-        metavar="RUNS.csv",
-        help="measured rows: CSV, Parquet or .xlsx; without it, print what the file is for",
-    )
-    parser.add_argument(
-        "--by",
-        metavar="COLUMN",
-        help="one estimate for each value of this column, such as run; all: one of all rows",
-    )
-    parser.add_argument(
-        "--with",
-        dest="others",
-        type=InputFile,
-        metavar="OTHER.onnx",
-        action="append",
-        default=[],
-        help="another model file to fuse with; can be repeated",
-    )
-    parser.add_argument("--rule", help=f"fusion rule of --with: {', '.join(FUSION_RULES)}")
-    parser.add_argument(
-        "--model",
-        dest="case",
-        type=InputFile,
-        metavar="MODEL.toml",
-        help="your wheel and effects, which are compared with those of the model file; for a file "
-        "for wheels of any size, also your soil, priors and noise",
-    )
-    parser.add_argument(
-        "--exact-model",
-        action="store_true",
-        help="assume a perfect model of wheel and soil, as for one checked on a known soil",
-    )
-    add_row_options(parser)
-    add_output(parser, "--out", "FILE.csv", "write the estimates to this file")
-    add_report_option(parser)
+ARGUMENTS = (
+    ("trained MODEL.onnx", "trained model file", InputFile),
+    ("runs RUNS.csv", "measured rows; without them, what the file is for", InputFile, OPTIONAL),
+    ("--by COLUMN", "one estimate for each value of this column, such as run, or all"),
+    ("--with OTHER.onnx", "a file to fuse with; can be repeated", InputFile, REPEATED),
+    ("--model MODEL.toml", "your wheel, effects, soil, priors and noise", InputFile),
+    "exact-model",
+    "rows",
+    ("--out FILE.csv", "write the estimates to this file", OutputFile),
+    "report",
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -122,15 +69,10 @@ def run(args: argparse.Namespace) -> int:
     need("onnxruntime", "estimate")
     import numpy as np
 
-    from soilml.cli.output import (
-        save_columns,
-        show,
-        show_rows,
-        write_with_report,
-    )
+    from soilml.cli.output import deliver, show
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.config.remainder import SAME_ROWS
-    from soilml.experiment_design.advice_after_results import trained_case
+    from soilml.experiment_design.expected_answers import trained_case
     from soilml.identification.model_error_inputs import trained_remainder, with_exact_model
     from soilml.identification.trained_estimator import check_table_wheel, estimators_for_case
     from soilml.io.bounds import ESTIMATES
@@ -140,9 +82,9 @@ def run(args: argparse.Namespace) -> int:
     from soilml.quantities import column
     from soilml.remarks import texts
 
-    estimators = [Estimator.load(file) for file in (args.trained, *args.others)]
+    estimators = [Estimator.load(file) for file in (args.trained, *args.with_)]
     _check_options(args, estimators)
-    if args.runs is None and args.case is None:
+    if args.runs is None and args.model is None:
         show("\n".join(presentation.description(estimator).text for estimator in estimators))
         return 0
     read = {name: column(name) for estimator in estimators for name in estimator.inputs}
@@ -152,15 +94,15 @@ def run(args: argparse.Namespace) -> int:
     if args.runs is not None:
         table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
         ESTIMATES.check(table.source, len(table))
-    if args.case is not None:
-        case = read_case_of_rows(args, args.case, table)
+    if args.model is not None:
+        case = read_case_of_rows(args, args.model, table)
         if table is not None and not any(map(trained_remainder, estimators)):
             learned, case = case.remainder, case.without_remainder_of(table)
             own = [SAME_ROWS] if case.remainder is not learned else []
     if args.exact_model:
         estimators = [with_exact_model(estimator) for estimator in estimators]
     estimators, remarks = estimators_for_case(
-        estimators, case, args.case, pooled=args.by is not None
+        estimators, case, args.model, pooled=args.by is not None
     )
     remarks = [*map(presentation.description, estimators), *remarks, *own]
     if table is None:
@@ -177,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
         wanted = ", ".join(column(n) for n in estimators[0].inputs)
         raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
     if args.by is None:
-        columns, own = _row_estimates(estimators, table, usable, args.rule, case)
+        columns, own = _row_estimates(estimators, table, usable, case)
     else:
         columns, own = _group_estimates(estimators[0], table, usable[0], args.by, case)
     remarks += own
@@ -194,33 +136,24 @@ def run(args: argparse.Namespace) -> int:
 
     title = f"Estimates of {Path(args.runs).name} by {Path(args.trained).name}"
     report = presentation.estimate_report(columns, remarks, estimators[0], args.by, title)
-    content = {k: np.asarray(v).tolist() for k, v in columns.items()}
-    notes = [remark.as_json() for remark in remarks]
-    write_with_report(
-        args,
-        {args.out: partial(save_columns, columns)},
-        lambda: (report, {"columns": content, "notes": notes}),
-        [str(e.path) for e in estimators],
-    )
-    show_rows(report, columns, content, args.out)
+    content = {
+        "columns": {k: np.asarray(v).tolist() for k, v in columns.items()},
+        "notes": [remark.as_json() for remark in remarks],
+    }
+    deliver(args, report, content, columns, [str(e.path) for e in estimators])
     return 0
 
 
 def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
     """Raise `InputError` for options that cannot be combined."""
     from soilml.onboard import table_estimates
-    from soilml.onboard.fusion_rules import COVARIANCE_INTERSECTION
     from soilml.onboard.joint_errors import are_comparable
-    from soilml.onboard.multi_sensor import CORRELATED
 
     if args.runs is None and any((args.by, args.where, args.out, args.report)):
         raise InputError("RUNS.csv is missing: --by, --where, --out and --report are for its rows")
-    if args.rule is not None and not args.others:
-        raise InputError("--rule is the fusion rule of --with; give --with OTHER.onnx")
-    if args.by is not None and args.others:
+    if args.by is not None and args.with_:
         raise InputError("--with fuses single rows; omit --by")
-    known = are_comparable([e.errors for e in estimators])
-    if args.rule != COVARIANCE_INTERSECTION and not (known and args.rule in (None, CORRELATED)):
+    if not are_comparable([e.errors for e in estimators]):
         table_estimates.check_independent(estimators)
     if args.by is not None and estimators[0].per_row:
         raise InputError(
@@ -233,13 +166,12 @@ def _row_estimates(
     estimators: list[Estimator],
     table: Table,
     usable: list[NDArray[np.bool_]],
-    rule: str | None,
     case: Case | None,
 ) -> tuple[dict[str, Any], list[Remark]]:
     """Columns with a line for every row, blank where no model has all its readings, and remarks."""
     import numpy as np
 
-    from soilml.experiment_design.advice_after_results import advice_after_estimate
+    from soilml.experiment_design.next_rows import advice_after_estimate
     from soilml.onboard import presentation, table_estimates
     from soilml.onboard.multi_sensor import fuse_estimates
     from soilml.quantities import column
@@ -252,7 +184,7 @@ def _row_estimates(
     columns |= {column(name): table[column(name)] for name in inputs}
     estimate, files = estimates[0], None
     if len(estimators) > 1:
-        combined = fuse_estimates(estimates, rule)
+        combined = fuse_estimates(estimates)
         estimate, files = combined.estimate, combined.used.sum(axis=0)
     for key, values in presentation.estimate_columns(estimate).items():
         columns[key] = np.where(answered, values, np.nan)
@@ -304,8 +236,8 @@ def _group_estimates(
     """Columns with a line for every value of a column, from all its usable rows, and remarks."""
     import numpy as np
 
-    from soilml.cli.progress import row_progress
-    from soilml.experiment_design.advice_after_results import advice_after_estimate
+    from soilml.cli.progress import working
+    from soilml.experiment_design.next_rows import advice_after_estimate
     from soilml.identification.model_error_inputs import readings_with_model_error
     from soilml.identification.trained_estimator import narrower_priors
     from soilml.io.table import ALL
@@ -322,8 +254,8 @@ def _group_estimates(
     ]
     box = {} if case is None else narrower_priors(estimator, case)
     counts = np.asarray([len(rows) for _, rows in groups])
-    with row_progress(f"estimating by {by}", estimator, int(counts.sum())) as counted:
-        estimate = table_estimates.estimates_of_runs(counted, readings, box)
+    with working(f"estimating by {by}"):
+        estimate = table_estimates.estimates_of_runs(estimator, readings, box)
     outside = estimate.rows_set_aside
     position = {name: i for i, name in enumerate(names)}
     answered = np.asarray([name in position for name in order])

@@ -6,14 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import (
-    add_cost_option,
-    add_effects_option,
-    add_model_and_runs,
-    add_row_options,
-    add_seed_option,
-    folder_outputs,
-)
+from soilml.cli.options import REPEATED, REQUIRED, folder_outputs
 from soilml.errors import InputError
 from soilml.io.atomic_files import write_files
 from soilml.io.cell_text import read_number
@@ -32,7 +25,6 @@ and run-to-run scatter, search for the missing effect, name it if the data
 distinguish it from all others, add it to the model, and report how much of the
 gap it closes.
 
-  soilml gap MODEL.toml RUNS.csv --out FOLDER
   soilml gap MODEL.toml RUNS.csv --out FOLDER --holdout run
   soilml gap MODEL.toml RUNS.csv --out FOLDER --holdout load_N=150
 
@@ -44,46 +36,30 @@ error in them appears as an effect.
 RUNS.csv has the columns run, slip, load_N, torque_Nm, and optionally
 drawbar_pull_N, sinkage_m, speed_m_s (below zero in reverse), pass,
 slip_angle_rad, time_s and <column>_std. FOLDER receives report.html (start here),
-gap.json, model.toml (the model with the effect that is missing, or all likely
-explanations with their weights, by whose mixture other commands predict) and
-next_runs.csv (runs to measure next). The exit status is 0 whatever the result,
-3 where the data cannot be analysed, and 2 for bad input.
+gap.json, model.toml (the model with the missing effect, or all likely
+explanations with their weights) and next_runs.csv (runs to measure next). The
+exit status is 0 whatever the result, 3 where the data cannot be analysed, and 2
+for bad input.
 
 Runs of several wheels on one soil: write each as [gears.NAME] in MODEL.toml,
 and name it in the column gear. An effect of one wheel is then grousers@NAME.
 
 --checked torque-gain=0.003 declares the standard deviation of a sensor's fault
-after calibration, in the unit that `soilml show effects` lists. --cost second-pass=3
-gives the cost of a kind of run in next_runs.csv, in any unit; runs are then
-ranked by what they discriminate per cost.
+after calibration. --cost second-pass=3 gives the cost of a kind of run.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add_model_and_runs(parser)
-    parser.add_argument(
-        "-o", "--out", metavar="FOLDER", required=True, help="folder for the four files"
-    )
-    parser.add_argument(
-        "--holdout",
-        metavar="COLUMN=VALUE",
-        help="rows held out for validation, or `run` for a quarter of the runs",
-    )
-    parser.add_argument(
-        "--free", metavar="A,B,...", help="soil parameters to fit (default: those with a prior)"
-    )
-    add_seed_option(parser)
-    parser.add_argument(
-        "--checked",
-        metavar="EFFECT=STD",
-        action="append",
-        default=[],
-        help="standard deviation of a sensor's fault after calibration; can be repeated",
-    )
-    add_cost_option(parser)
-    add_row_options(parser)
-    add_effects_option(parser)
+ARGUMENTS = (
+    "model-and-runs",
+    ("--out FOLDER", "folder for the four files", REQUIRED),
+    ("--holdout COLUMN=VALUE", "rows held out for validation, or `run` for a quarter of the runs"),
+    "free",
+    "seed",
+    ("--checked EFFECT=STD", "std of a sensor's fault after calibration; can repeat", REPEATED),
+    "cost",
+    "rows",
+    "effects",
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -105,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     for library in ("scipy", "jinja2", "matplotlib"):
         need(library, "gap")
     from soilml.gap import gap
-    from soilml.gap.report.report import gap_files
+    from soilml.gap.report import gap_files
 
     table, costs = read_rows(args, RUNS), parse_costs(args)
     effects = available_effects(args)

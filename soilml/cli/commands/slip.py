@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.options import InputFile, add_effects_option, add_ignore_extra_option, add_output
+from soilml.cli.options import InputFile, OutputFile
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
@@ -29,27 +29,23 @@ not determined. FILE.json has the same with remarks.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("rover", type=InputFile, metavar="ROVER.toml", help="rover and prior")
-    parser.add_argument(
-        "drive", type=InputFile, metavar="DRIVE.csv", help="a row for each time and wheel"
-    )
-    add_effects_option(parser)
-    add_ignore_extra_option(parser)
-    add_output(parser, "--out", "FILE.csv", "write the table to this file, or FILE.json", ".json")
-    add_output(parser, "--picture", "FILE.png", "draw slip, speed and pitch against time")
+ARGUMENTS = (
+    ("rover ROVER.toml", "rover and prior", InputFile),
+    ("drive DRIVE.csv", "a row for each time and wheel", InputFile),
+    "effects",
+    "ignore-extra",
+    ("--out FILE.csv|.json", "write the table to this file, or FILE.json", OutputFile),
+    ("--picture FILE.png", "draw slip, speed and pitch against time", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:
     """Infer and write."""
-    from soilml.cli.options import available_effects, is_json
-    from soilml.cli.output import show_result, show_rows, write_set
+    from soilml.cli.options import available_effects
+    from soilml.cli.output import deliver
     from soilml.cli.progress import working
     from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case
-    from soilml.io.text_tables import csv_text
-    from soilml.report.page import json_text
     from soilml.slip_filter.drive import read_drive, slip_of_drive
     from soilml.slip_filter.presentation import (
         drive_columns,
@@ -63,12 +59,5 @@ def run(args: argparse.Namespace) -> int:
     with working(f"inferring from {len(rows.time)} rows"):
         found = slip_of_drive(case, rows)
 
-    report, columns, content = report_of_drive(found), drive_columns(found), drive_json(found)
-    whole = args.out is not None and is_json(args)
-    table = json_text(content) if whole else csv_text(columns)
-    write_set({args.out: table, args.picture: report.pictures[0].save})
-    if args.out is None:
-        show_rows(report, columns, content)
-    else:
-        show_result(report, content)
+    deliver(args, report_of_drive(found), drive_json(found), drive_columns(found))
     return 0

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.option_values import NumberFrom
-from soilml.cli.options import InputFile, add_by_option, add_ignore_extra_option, add_output
+from soilml.cli.options import InputFile, OutputFile
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,24 +23,18 @@ and what they mean for a heavy rover that is to follow.
 STRIDES.csv has a row for each stride: run, slip, and one or more of torque_Nm
 (at midstance), vibration_m_s2 (largest acceleration after it) and sinkage_m
 (at midstance); blank where not measured. `soilml import` makes it from a log.
-Each sensor has an estimate, with a standard deviation, and `fused` is that of
-all by the weights of eq. 30. Standard deviations include the error that all
-strides on a soil share, as large as on the four soils of the source (table
-VIII): more strides do not lessen it.
+`fused` is the estimate by all sensors (eq. 30). Standard deviations include the
+error that all strides on a soil share (table VIII).
 
 The last row of each soil has k_phi and the pull efficiency of a wheel of a
-300 kg rover (eq. 32) with its class: non-trafficable, unsafe from 35 %, safe
-from 50 %, trafficable from 65 %. Strides show neither n nor cohesion nor shear
-modulus: these are uniform over the four soils of the source, unless --assume
-has them. --wheel has another wheel.
+300 kg rover (eq. 32) with its class. n, cohesion and shear modulus, which
+strides do not show, are uniform over the four soils of the source, unless
+--assume has them. --wheel has another wheel.
 
 On a known soil the same relations give the slip of each stride:
 
   soilml paper wheel-leg STRIDES.csv --known SSC-2
   soilml paper wheel-leg STRIDES.csv --known 35.8,22000     degrees and Pa, 1 cm deep
-
-with that of torque and vibration, and `slip`, fused by eq. 26. A column slip of
-STRIDES.csv is then passed on as slip_measured.
 
 The relations are of one wheel-leg: five legs, Load Testing Feet, 3.75 kg. For
 another train a file on its strides: soilml train slip_torque.
@@ -49,51 +42,18 @@ another train a file on its strides: soilml train slip_torque.
 SENSORS = {"torque_Nm": "torque", "vibration_m_s2": "vibration", "sinkage_m": "sinkage"}
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "runs", type=InputFile, metavar="STRIDES.csv", help="strides: CSV, Parquet or .xlsx"
-    )
-    parser.add_argument(
-        "--torque-model",
-        default="simplified",
-        metavar="NAME",
-        help="terramechanics, empirical or simplified (default), which needs one stride",
-    )
-    parser.add_argument(
-        "--vibration-model",
-        default="linear",
-        metavar="NAME",
-        help="planar, or linear (default), which needs one stride",
-    )
-    parser.add_argument(
-        "--assume",
-        metavar="NAME=VALUE,...",
-        help="n, cohesion (Pa) or shear_modulus (m) of the soil, where they are known",
-    )
-    parser.add_argument(
-        "--wheel",
-        metavar="R,B,N",
-        help="radius and width (m) and load (N) of the heavy rover's wheel "
-        "(default: 0.15,0.18,490.5)",
-    )
-    parser.add_argument(
-        "--known", metavar="SOIL", help="name of table I, or degrees,Pa: give the slip on this soil"
-    )
-    parser.add_argument(
-        "--torque-std", type=NumberFrom(0.0, 1e6, "N m"), default=0.0, metavar="NM", help="std, N m"
-    )
-    parser.add_argument(
-        "--vibration-std",
-        type=NumberFrom(0.0, 1e4, "m/s^2"),
-        default=0.0,
-        metavar="M_S2",
-        help="std, m/s^2",
-    )
-    add_by_option(parser)
-    add_ignore_extra_option(parser)
-    add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_output(parser, "--picture", "FILE.png", "draw the soil by sensor, or the slip by stride")
+ARGUMENTS = (
+    ("runs STRIDES.csv", "strides: CSV, Parquet or .xlsx", InputFile),
+    ("--torque-model NAME (simplified)", "terramechanics, empirical or simplified"),
+    ("--vibration-model NAME (linear)", "planar, or linear, which needs one stride"),
+    ("--assume NAME=VALUE,...", "n, cohesion (Pa) or shear_modulus (m) where they are known"),
+    ("--wheel R,B,N", "of the heavy rover: m, m and load in N (default: 0.15,0.18,490.5)"),
+    ("--known SOIL", "name of table I, or degrees,Pa: give the slip on this soil"),
+    "by",
+    "ignore-extra",
+    ("--out FILE.csv", "write the table to this file", OutputFile),
+    ("--picture FILE.png", "draw the soil by sensor, or the slip by stride", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -110,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
     """The options that soil and slip share."""
-    names = ("torque_model", "vibration_model", "torque_std", "vibration_std")
+    names = ("torque_model", "vibration_model")
     return {name: getattr(args, name) for name in names}
 
 
@@ -144,7 +104,7 @@ def _known_soil(text: str) -> tuple[float, float]:
     import math
 
     from soilml.cli.option_values import parse_numbers
-    from soilml.systems.wheel_legs import GROUNDS
+    from soilml.systems.wheel_legs.resistive_force import GROUNDS
 
     if text.upper() in GROUNDS:
         ground = GROUNDS[text.upper()]
@@ -163,7 +123,7 @@ def _known_soil(text: str) -> tuple[float, float]:
 
 def _soil(args: argparse.Namespace, table: Table) -> int:
     """The soil by each sensor and fused, and what it means for a heavy rover."""
-    from soilml.cli.output import write_rows
+    from soilml.cli.output import deliver
     from soilml.cli.tables import result_by_group
     from soilml.systems.wheel_legs import Mobility, StrideSoil, mobility, soil_of_strides
     from soilml.systems.wheel_legs.strides import stride_report
@@ -177,7 +137,7 @@ def _soil(args: argparse.Namespace, table: Table) -> int:
 
     found, failed = result_by_group(args, table, "estimating", estimate)
     report, rows = stride_report(found, failed, args.by)
-    write_rows(report, rows, args.out, args.picture)
+    deliver(args, report, columns=rows)
     return 0
 
 

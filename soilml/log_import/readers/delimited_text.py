@@ -126,8 +126,8 @@ def _plain_recording(path: Path, progress: Callable[[int], None] | None) -> Reco
                 skip_empty=True,
             ):  # fmt: skip
                 for name in layout.names:
-                    cells = batch.column(name).to_numpy(zero_copy_only=False)[first::every]
-                    found[name].append(cells)
+                    cells = batch.column(name).to_numpy(zero_copy_only=False)
+                    found[name].append(cells[first::every].copy())  # else a view keeps all
                 first = (first - len(batch)) % every
     except (ImportError, ValueError):  # pyarrow's own errors are kinds of `ValueError`
         return None

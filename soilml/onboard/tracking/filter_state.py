@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -31,7 +32,7 @@ REPETITIONS = 2
 ALIVE_AFTER = 8
 Arrays = dict[str, NDArray[Any]]
 
-FORMAT = 4  # Version of the arrays
+FORMAT = 5  # Version of the arrays
 CHECKSUM = "checksum"  # Name of the array that has the checksum of the others
 
 
@@ -182,38 +183,30 @@ class FilterState:
 
     def as_arrays(self, identity: str) -> Arrays:
         """Everything as arrays of numbers and text, for `numpy.savez`."""
-        blocks = self.window.blocks
-        empty = self.window.memory.system[:0]
-        previous = [] if self.repeated.previous is None else [self.repeated.previous]
-        rows = [*previous, *self.question.rows]
-        recent = self.window.recent
-        read = [row for one in recent for row in _one_by_one(one.rows)]
-        names = list((rows or read or [{}])[0])
+        window, question, repeated = self.window, self.question, self.repeated
+        numbers = {
+            "length": window.length,
+            "lengths": [len(block.system) for block in window.blocks],
+            "added": window.added,
+            "recent": [{"rows": as_lists(one.rows), "known": one.known} for one in window.recent],
+            "question": [as_lists(row) for row in question.rows],
+            "disagree": question.disagree,
+            "in_succession": question.in_succession,
+            "previous": None if repeated.previous is None else as_lists(repeated.previous),
+            "times": repeated.times,
+            "changes": repeated.changes,
+            "increases": self.increases,
+            "rows_since_change": self.rows_since_change,
+            "rows_since_drift": self.rows_since_drift,
+            "variance": self.variance,
+        }
+        blocks = window.blocks
         arrays = {
             "format": np.asarray(FORMAT),
             "model": np.asarray(identity),
-            "system": np.concatenate([empty, *(block.system for block in blocks)]),
+            "system": np.concatenate([window.memory.system[:0], *(b.system for b in blocks)]),
             "counts": np.reshape([block.counts for block in blocks], (len(blocks), 3)),
-            "lengths": np.asarray([len(block.system) for block in blocks], dtype=np.int64),
-            "names": np.asarray(names, dtype=np.str_),
-            "rows": np.reshape([row[n][0] for row in rows for n in names], (len(rows), len(names))),
-            "recent": np.reshape([row[n] for row in read for n in names], (len(read), len(names))),
-            "known": np.asarray([one.known for one in recent], dtype=np.int64),
-            "disagree": np.asarray(self.question.disagree, dtype=np.bool_),
-            "added": np.asarray(self.window.added, dtype=np.float64),
-            "increases": np.asarray(self.increases, dtype=np.float64),
-            "variance": np.asarray(self.variance),
-            "repeated": np.asarray(self.repeated.times, dtype=np.int64),
-            "changes": np.asarray(self.repeated.changes, dtype=np.int64),
-            "numbers": np.asarray(
-                [
-                    self.window.length,
-                    self.question.in_succession,
-                    self.rows_since_change,
-                    self.rows_since_drift,
-                ],
-                dtype=np.int64,
-            ),
+            "numbers": np.asarray(json.dumps(numbers)),
         }
         return arrays | {CHECKSUM: np.asarray(checksum_of(arrays))}
 
@@ -242,9 +235,14 @@ def checksum_of(arrays: Mapping[str, Any]) -> int:
     return state_checksum(*(part for name in names for part in (name, arrays[name])))
 
 
-def _one_by_one(rows: Rows) -> list[dict[str, float]]:
-    """Several rows as one mapping each."""
-    return [{n: float(v[i]) for n, v in rows.items()} for i in range(len(rows["slip"]))]
+def as_lists(row: Rows) -> dict[str, list[float]]:
+    """Rows (m,) by name as lists."""
+    return {name: values.tolist() for name, values in row.items()}
+
+
+def _rows_of(entry: Mapping[str, Any]) -> Rows:
+    """The inverse of `as_lists`."""
+    return {name: np.asarray(values, np.float64) for name, values in entry.items()}
 
 
 def _read(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterState:
@@ -260,51 +258,29 @@ def _read(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterStat
         )
     if int(arrays[CHECKSUM]) != checksum_of(arrays):
         raise ValueError("its checksum does not match")
-    ends = np.cumsum(arrays["lengths"])
+    numbers = json.loads(str(arrays["numbers"]))
+    ends = np.cumsum([0, *numbers["lengths"]])
     system = np.asarray(arrays["system"], dtype=start.system.dtype)
-    if system.shape != (ends[-1] if len(ends) else 0, start.system.shape[1]):
+    if system.shape != (ends[-1], start.system.shape[1]):
         raise ValueError(f"its system has shape {system.shape}")
     for part in (system, np.asarray(arrays["counts"], dtype=np.float64)):
         if not (np.abs(part) < np.finfo(np.float32).max).all():
             raise ValueError("it has numbers that are not finite, or too large")
-    parts = zip(np.split(system, ends[:-1]), arrays["counts"], strict=True) if len(ends) else ()
+    parts = zip(np.split(system, ends[1:-1]), arrays["counts"], strict=len(ends) > 1)
     blocks = tuple(
         replace(start, system=part, counts=np.asarray(count, np.float32)) for part, count in parts
     )
-    length, in_succession, since_change, since_drift = (int(n) for n in arrays["numbers"])
-    added = tuple(float(value) for value in arrays["added"])
-    if not len(added) <= len(blocks) or not np.isfinite(added).all():
-        raise ValueError(f"it has {len(added)} last rows in {len(blocks)} blocks")
-    recent = _read_recent(arrays, blocks[len(blocks) - len(added) :])
-    window = RowWindow(blocks, join(blocks) if blocks else start, length, added, recent)
-    rows: list[Rows] = [
-        {str(n): np.asarray([float(v)]) for n, v in zip(arrays["names"], row, strict=True)}
-        for row in arrays["rows"]
-    ]
-    flags = tuple(bool(flag) for flag in arrays["disagree"])
-    previous = rows[0] if rows else None
-    question = RowsInQuestion(tuple(rows[1:]), flags, in_succession)
-    if len(question.rows) != len(flags):
-        raise ValueError(f"it has {len(question.rows)} rows in question and {len(flags)} flags")
-    repeated = RepeatedReadings(
-        previous, *(tuple(int(n) for n in arrays[name]) for name in ("repeated", "changes"))
-    )
-    increases = tuple(float(value) for value in arrays["increases"])
-    variance = float(arrays["variance"])
-    if not 1.0 <= variance < np.inf:
-        raise ValueError(f"its noise is {variance:g} times that stated")
-    return FilterState(window, question, repeated, increases, since_change, since_drift, variance)
-
-
-def _read_recent(arrays: Mapping[str, Any], blocks: Sequence[Memory]) -> tuple[RecentRows, ...]:
-    """The rows of the recent blocks, as they were read."""
-    counts, known = [block.rows for block in blocks], arrays["known"]
-    readings = np.asarray(arrays["recent"], dtype=np.float64)
-    if len(readings) != sum(counts) or len(known) != len(counts) or np.isinf(readings).any():
-        raise ValueError(f"it has {len(readings)} rows as read in {len(counts)} last blocks")
-    names = [str(name) for name in arrays["names"]]
-    parts = np.split(readings, np.cumsum(counts)[:-1]) if counts else []
-    return tuple(
-        RecentRows(dict(zip(names, part.T, strict=True)), int(number))
-        for part, number in zip(parts, known, strict=True)
+    recent = tuple(RecentRows(_rows_of(r["rows"]), int(r["known"])) for r in numbers["recent"])
+    memory = join(blocks) if blocks else start
+    window = RowWindow(blocks, memory, numbers["length"], tuple(numbers["added"]), recent)
+    rows = tuple(_rows_of(row) for row in numbers["question"])
+    previous = None if numbers["previous"] is None else _rows_of(numbers["previous"])
+    return FilterState(
+        window,
+        RowsInQuestion(rows, tuple(numbers["disagree"]), numbers["in_succession"]),
+        RepeatedReadings(previous, tuple(numbers["times"]), tuple(numbers["changes"])),
+        tuple(numbers["increases"]),
+        numbers["rows_since_change"],
+        numbers["rows_since_drift"],
+        numbers["variance"],
     )

@@ -1,5 +1,7 @@
 """Errors that all rows of a set share, of the sensors and of the model."""
 
+import json
+
 import numpy as np
 import pytest
 from conftest import simulated_run
@@ -11,6 +13,7 @@ from soilml.onboard.set_contract import (
     INFERRED,
     MODEL_ERROR_INPUT,
 )
+from soilml.onboard.set_posterior import SetPosterior
 from soilml.physics.operating_point import Operating
 
 #: Sensors without errors that all readings share.
@@ -82,14 +85,6 @@ def test_intervals_hold_where_the_bearing_is_another(estimator, wheel_posterior)
     assert usual.min() > 0.7
 
 
-def test_a_model_with_errors_increases_the_covariance(estimator, wheel_posterior):
-    run, _ = simulated_run(wheel_posterior, 16)
-    exact = estimator.on(**EXACT)
-    sizes = [exact.on(model_error=size).run(**run).covariance for size in (0.0, 0.5, 1.0)]
-    areas = [np.linalg.det(covariance) for covariance in sizes]
-    assert areas[1] > 2.0 * areas[0] and areas[2] > 1.5 * areas[1]
-
-
 def test_the_size_of_the_errors_of_the_model_is_inferred_unless_told(estimator, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 16)
     assert estimator.sets.common_errors[MODEL_ERROR_INPUT] == INFERRED
@@ -110,3 +105,16 @@ def test_a_stream_has_the_errors_of_its_model(estimator, wheel_posterior):
     assert found.std == pytest.approx(together.std, rel=0.25)
     with pytest.raises(InputError, match="this memory is of"):
         estimator.step(memory, **run)
+
+
+@pytest.mark.parametrize(
+    ("lacking", "columns"),
+    [({"model_errors"}, 6), ({"errors", "model_errors", "least_share_in_range", "misfit"}, 1)],
+)
+def test_files_of_earlier_interfaces_know_fewer_errors(estimator, lacking, columns):
+    metadata = json.loads(estimator.metadata["set"])
+    metadata["errors"].pop("model_error")
+    former = SetPosterior.of({k: v for k, v in metadata.items() if k not in lacking})
+    assert former.columns == former.terms + columns
+    with pytest.raises(InputError, match="of an earlier version takes it as zero: train it again"):
+        former.with_context({"model_error": 1.0}, {})

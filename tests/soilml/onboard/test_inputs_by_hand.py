@@ -5,12 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
-from soilml.onboard.multi_sensor import (
-    SAME_PRIOR,
-    fuse_estimates,
-)
+from soilml.onboard.multi_sensor import fuse_estimates
 from soilml.onboard.set_contract import ABSENT_READING, ABSENT_STD
 from soilml.onboard.set_posterior import SetPosterior, constant_noise_factor
 
@@ -20,6 +16,8 @@ SETS = SetPosterior(
     context_ranges={},
     context_values={},
     sets_only=True,
+    common_errors={},
+    least_share_in_range=0.5,
 )
 ROWS = {"slip": np.asarray([0.1, 0.2]), "torque": np.asarray([10.0, -5.0]), "load": 60.0}
 
@@ -80,12 +78,7 @@ def test_the_weighted_logarithm_of_torques_with_constant_noise_has_no_bias(const
     assert abs(after) < 0.1 * before
 
 
-PRIOR = PriorSummary(
-    np.asarray([1.0, 10.0]),
-    np.asarray([0.5, 4.0]),
-    np.asarray([0.0, 2.0]),
-    np.asarray([2.0, 18.0]),
-)
+PRIOR = PriorSummary(*np.asarray([[1.0, 10.0], [0.5, 4.0], [0.0, 2.0], [2.0, 18.0]]))
 
 
 def estimates(mean, std, in_range, prior=PRIOR):
@@ -114,13 +107,8 @@ def test_fused_rows_keep_shape_ends_and_reasons():
     assert found.estimate.reason[0, 0] == Reason.CONTRADICTORY and not found.used.any()
 
 
-def test_priors_must_agree_to_a_hundredth_of_their_spread():
-    one = estimates([1.0, 9.0], [0.1, 1.0], True)
-    for share, refused in ((0.9, False), (1.1, True)):
-        prior = replace(PRIOR, mean=PRIOR.mean - share * SAME_PRIOR * PRIOR.std)
-        other = estimates([1.0, 9.0], [0.1, 1.0], True, prior)
-        if refused:
-            with pytest.raises(InputError, match="different priors of a, b: from 0, 2 to 2, 18"):
-                fuse_estimates([one, other])
-        else:
-            assert fuse_estimates([one, other]).estimate.in_range
+def test_a_mean_within_one_and_a_half_standard_deviations_of_an_end_is_at_the_edge():
+    mean = [[1.49, 10.0], [1.51, 10.0], [1.0, 3.51], [1.0, 3.49], [1.0, 16.6]]
+    found = estimates(mean, [[1.0 / 3.0, 1.0]] * 5, [True] * 5)
+    at_edge = [[False, False], [True, False], [False, False], [False, True], [False, True]]
+    assert found.at_edge.tolist() == at_edge

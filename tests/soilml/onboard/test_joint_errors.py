@@ -134,18 +134,3 @@ def test_readings_that_disagree_widen_the_estimate_and_contradict_beyond_four_de
     assert not answer.in_range[0] and answer.reason[0] == Reason.CONTRADICTORY
     np.testing.assert_array_equal(answer.mean[0], answer.prior.mean)
     assert not contradictory.used.any()
-
-
-def test_what_a_file_carries_is_read_back_as_it_was_written():
-    file = Sensors().files()[0]
-    again = HeldOutErrors.of(file.entry())
-    assert HeldOutErrors.of(again.entry()) == again
-    np.testing.assert_allclose(again.std, file.std, rtol=1e-3)
-    without = file.entry() | {
-        "repeats": [1], "repeat_std": [[1.0]], "repeat_coverage_factor": [[1.6]],
-    }  # fmt: skip
-    alone = HeldOutErrors.of(without)
-    assert alone.common_share()[0] == 1.0 and alone.repeated(8)[0][0] == 1.0
-    for damage in ({"std": file.std - 1.0}, {"truth": [0.1]}, {"repeats": [2, 8]}):
-        with pytest.raises(ValueError):
-            HeldOutErrors.of(file.entry() | damage)

@@ -29,14 +29,6 @@ def test_both_files_are_written_and_their_memory_is_said(tmp_path, capsys):
     assert not [p for p in tmp_path.iterdir() if p.name not in ("linear.c", "linear.h")]
 
 
-def test_the_same_file_gives_the_same_bytes(tmp_path):
-    for folder in ("a", "b"):
-        (tmp_path / folder).mkdir()
-        assert main(["export-c", str(LINEAR), str(tmp_path / folder / "linear.c")]) == 0
-    first, second = ((tmp_path / folder / "linear.c").read_bytes() for folder in ("a", "b"))
-    assert first == second
-
-
 @pytest.mark.parametrize("name", ["1wheel.c", "Wheel.c", "my-wheel.c", "wheel v2.c"])
 def test_a_name_that_c_does_not_take_is_refused(name, tmp_path, capsys):
     refused([LINEAR, tmp_path / name], capsys, "begins the names of the C functions")

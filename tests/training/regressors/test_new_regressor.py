@@ -1,4 +1,4 @@
-"""A new regressor needs its class and a line of the catalogue: card, plots and export follow."""
+"""A new regressor needs its class and a line of the catalogue: card and export follow."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ import pytest
 from soilml import Estimator
 from training import spec as specs
 from training.dataset import read_dataset
-from training.export.learning_curves import plot_learning_curves
 from training.export.model_card import model_card
 from training.export.model_file import export_model
 from training.regressors.gaussian_regressor import GaussianRegressor
@@ -37,7 +36,6 @@ def test_a_new_regressor_is_trained_exported_and_described(tmp_path, small_data,
     spec = specs.read_spec(tmp_path / "s.toml")
     trained = train(spec, read_dataset(small_data, spec.features, spec.targets))
     metadata = export_model(trained, tmp_path / "m.onnx", small_data)
-    plot_learning_curves(trained, tmp_path / "m.png")
     assert "Regressors: mean." in model_card(trained, metadata, "m")
     estimator = Estimator.load(tmp_path / "m.onnx")
     estimate = estimator(slip=0.3, torque=3.0, load=60.0)

@@ -9,16 +9,13 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import check_estimator
 
 from training.regressors.gaussian_mlp import GaussianMLP
+from training.regressors.gaussian_regressor import folds_of
 from training.regressors.linear_gaussian import LinearGaussian
-from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
-from training.regressors.nystrom_features import NystromFeatures
-from training.regressors.rbf_expansion import rbf
-from training.regressors.row_groups import folds_of
-from training.regressors.tiled_cholesky import tiles_of
+from training.regressors.lssvm import LSSVM
+from training.regressors.nystrom_features import NystromFeatures, rbf
 
 ALL = [
     LSSVM(gamma=10.0, width=1.0),
-    FixedSizeLSSVM(gamma=10.0, width=1.0),
     LinearGaussian(),
     GaussianMLP(),
 ]
@@ -39,49 +36,37 @@ def test_passes_the_checks_of_scikit_learn(regressor):
     assert sum(r["status"] == "passed" for r in results) > 40
 
 
-@pytest.mark.parametrize(
-    "regressor", [LSSVM(gamma=30.0, width=0.8), FixedSizeLSSVM(30, gamma=30.0, width=0.8)]
-)
-def test_rows_left_out_in_closed_form_are_those_of_fits_without_them(regressor):
-    """Every row is estimated as by the whole bordered system without its tile or fold."""
+def test_rows_left_out_in_closed_form_are_those_of_fits_without_them():
     x, y, _ = curve(120)
-    groups = np.repeat(np.arange(24), 5)
+    groups, regressor = np.repeat(np.arange(24), 5), LSSVM(30, gamma=30.0, width=0.8)
     mean, _ = regressor.fit_left_out(x, y, groups, lambda done, total: None)
     u, z = regressor.x_scaling_.apply(x), regressor.y_scaling_.apply(y)
-    if isinstance(regressor, FixedSizeLSSVM):
-        outs, exact = [folds_of(groups) == k for k in range(20)], False
-    else:
-        order, slices = tiles_of(groups)
-        outs, exact = [np.isin(np.arange(120), order[rows]) for rows in slices], True
-    for out in outs:
+    phi = NystromFeatures.of(regressor.centres_, 0.8).at(u)
+    for k in range(20):
+        out = folds_of(groups) == k
         assert len(np.intersect1d(groups[out], groups[~out])) == 0 < out.sum() < 30
-        if exact:
-            centres, kernel = u[~out], rbf(u[~out], u[~out], 0.8) + np.eye((~out).sum()) / 30.0
-        else:  # in the primal, with the features of all centres
-            features = NystromFeatures.of(regressor.expansion_.centres, 0.8)
-            phi = features.at(u)
-            a = phi[~out] - phi[~out].mean(axis=0)
-            weights = np.linalg.solve(
-                a.T @ a + np.eye(phi.shape[1]) / 30.0, a.T @ (z[~out] - z[~out].mean(axis=0))
-            )
-            expected = z[~out].mean(axis=0) + (phi[out] - phi[~out].mean(axis=0)) @ weights
-            np.testing.assert_allclose(
-                regressor.y_scaling_.apply(mean[out]), expected, rtol=1e-6, atol=1e-8
-            )
-            continue
-        n = len(centres)
-        system = np.zeros((n + 1, n + 1))
-        system[0, 1:] = system[1:, 0] = 1.0
-        system[1:, 1:] = kernel
-        solution = np.linalg.solve(system, np.vstack([np.zeros((1, 2)), z[~out]]))
-        expected = rbf(u[out], centres, 0.8) @ solution[1:] + solution[0]
-        np.testing.assert_allclose(regressor.y_scaling_.apply(mean[out]), expected, atol=1e-8)
+        a, middle = phi[~out] - phi[~out].mean(axis=0), z[~out].mean(axis=0)
+        weights = np.linalg.solve(a.T @ a + np.eye(phi.shape[1]) / 30.0, a.T @ (z[~out] - middle))
+        expected = middle + (phi[out] - phi[~out].mean(axis=0)) @ weights
+        found = regressor.y_scaling_.apply(mean[out])
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-8)
+
+
+def test_with_as_many_centres_as_rows_it_is_the_exact_solution_of_the_dual():
+    x, y, _ = curve(100)
+    regressor = LSSVM(100, gamma=30.0, width=0.8).fit(x, y)
+    u, z = regressor.x_scaling_.apply(x), regressor.y_scaling_.apply(y)
+    system = np.ones((101, 101))
+    system[0, 0], system[1:, 1:] = 0.0, rbf(u, u, 0.8) + np.eye(100) / 30.0
+    solution = np.linalg.solve(system, np.vstack([np.zeros((1, 2)), z]))
+    probe = curve(50, seed=1)[0]
+    expected = rbf(regressor.x_scaling_.apply(probe), u, 0.8) @ solution[1:] + solution[0]
+    found = regressor.y_scaling_.apply(regressor.predict(probe))
+    np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "regressor", [LSSVM(), FixedSizeLSSVM(centres=120), GaussianMLP(epochs=300, batch=64)]
-)
+@pytest.mark.parametrize("regressor", [LSSVM(centres=120), GaussianMLP(epochs=300, batch=64)])
 def test_fits_a_curve_better_than_a_line_and_estimates_the_noise(regressor):
     x, y, _ = curve(900)
     probe, noisy, clean = curve(600, seed=1)
@@ -97,8 +82,7 @@ def test_fits_a_curve_better_than_a_line_and_estimates_the_noise(regressor):
 def test_std_does_not_shrink_far_from_the_data():
     x, y, _ = curve(400)
     for regressor in (
-        LSSVM(),
-        FixedSizeLSSVM(centres=50),
+        LSSVM(centres=50),
         GaussianMLP(epochs=20),
         LinearGaussian(),
     ):
@@ -111,17 +95,16 @@ def test_std_does_not_shrink_far_from_the_data():
 
 def test_the_public_regressors_work_in_pipelines_and_searches():
     import soilml.regressors
-    from soilml.regressors import FixedSizeLSSVM as Public
 
-    assert Public is FixedSizeLSSVM
+    assert soilml.regressors.LSSVM is LSSVM
     assert dir(soilml.regressors) == soilml.regressors.__all__
     assert all(getattr(soilml.regressors, name) for name in soilml.regressors.__all__)
     with pytest.raises(AttributeError, match="has no 'Forest'"):
         _ = soilml.regressors.Forest
     x, y, _ = curve(200)
-    pipeline = make_pipeline(StandardScaler(), Public(centres=20))
-    search = GridSearchCV(pipeline, {"fixedsizelssvm__centres": [3, 40]}, cv=3).fit(x, y)
-    assert search.best_params_ == {"fixedsizelssvm__centres": 40}
+    pipeline = make_pipeline(StandardScaler(), LSSVM(centres=20))
+    search = GridSearchCV(pipeline, {"lssvm__centres": [3, 40]}, cv=3).fit(x, y)
+    assert search.best_params_ == {"lssvm__centres": 40}
     mean, std = search.best_estimator_.predict(x, return_std=True)
     assert mean.shape == std.shape == y.shape and (std > 0.0).all()
     np.testing.assert_array_equal(mean, search.predict(x))

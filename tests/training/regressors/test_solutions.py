@@ -1,13 +1,11 @@
 """Solutions in tiles and in parts are those at once; gradients are those of differences."""
 
-import tracemalloc
-
 import numpy as np
 import pytest
 
 from soilml.processes import limited_workers
-from training.regressors import exact_solution, nystrom_features
-from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
+from training.regressors import nystrom_features
+from training.regressors.lssvm import LSSVM
 from training.regressors.tanh_network import TanhNetwork
 
 
@@ -21,37 +19,15 @@ def curve(rows, seed=0, noise=0.1):
 @pytest.mark.slow
 def test_the_fixed_size_solution_in_parts_is_that_of_all_rows_at_once(monkeypatch):
     x, y, _ = curve(3000)
-    once = FixedSizeLSSVM(centres=40).fit(x, y)
+    once = LSSVM(centres=40).fit(x, y)
     monkeypatch.setattr(nystrom_features, "CHUNK", 256)
     found = []
     for threads in (1, 3):
         with limited_workers(threads):
-            found.append(FixedSizeLSSVM(centres=40).fit(x, y).predict(x, return_std=True))
+            found.append(LSSVM(centres=40).fit(x, y).predict(x, return_std=True))
     for one, three, whole in zip(*found, once.predict(x, return_std=True), strict=True):
         np.testing.assert_array_equal(one, three)  # whatever the number of threads
         np.testing.assert_allclose(one, whole, rtol=1e-5, atol=1e-7)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("regressor", "rows"),
-    [
-        (FixedSizeLSSVM(centres=60, gamma=10.0, width=1.0), 60_000),
-        (LSSVM(solution="exact", gamma=10.0, width=1.0), 3000),
-    ],
-)
-def test_a_fit_stays_within_the_memory_that_it_states(regressor, rows, monkeypatch):
-    monkeypatch.setattr(exact_solution, "SEARCH_ROWS", 300)
-    x, y, _ = curve(rows)
-    regressor.fit(x[:1000], y[:1000])  # what it imports is not of the fit
-    tracemalloc.start()
-    try:
-        regressor.fit(x, y)
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    stated = regressor.requirements(rows, 2, 2).memory
-    assert 0.3 * stated < peak < stated
 
 
 @pytest.mark.slow
@@ -62,11 +38,10 @@ def test_rows_of_one_soil_do_not_mislead_where_they_are_left_out_together():
     y = np.sin(2.0 * x) + shared
     other = rng.uniform(-2.0, 2.0, (400, 1))
     truth = np.sin(2.0 * other)
-    for regressor in (LSSVM(), FixedSizeLSSVM(centres=60)):
-        misled = np.sqrt(np.mean((regressor.fit(x, y).predict(other) - truth) ** 2))
-        regressor.fit_left_out(x, y, np.repeat(np.arange(80), 10), no_progress)
-        sound = np.sqrt(np.mean((regressor.predict(other) - truth) ** 2))
-        assert sound < 0.75 * misled
+    regressor = LSSVM(centres=60)
+    misled = np.sqrt(np.mean((regressor.fit(x, y).predict(other) - truth) ** 2))
+    regressor.fit_left_out(x, y, np.repeat(np.arange(80), 10), no_progress)
+    assert np.sqrt(np.mean((regressor.predict(other) - truth) ** 2)) < 0.75 * misled
 
 
 def no_progress(done, total):

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from soilml.onboard.set_contract import ABSENT_STD
-from training.benchmark.bayes_limit_file import FRACTIONS
 from training.set_posterior.posterior_summary import INTERVAL
 from training.set_posterior.validation import graph_outputs, posterior_session
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "bench"))
 
-from exact_sets import posterior_of_memory
+from exact_sets import FRACTIONS, posterior_of_memory
 
 pytestmark = pytest.mark.slow
 

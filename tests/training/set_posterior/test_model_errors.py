@@ -13,7 +13,7 @@ from soilml.onboard.set_contract import (
     MEMORY_INPUTS,
     MODEL_ERROR_COLUMNS,
 )
-from soilml.physics.effects.exit_angle import ExitAngle
+from soilml.physics.effects.contact_shape import ExitAngle
 from soilml.quantities import SHEAR
 from training.onnx_graph.builder import Graph, session_of
 from training.onnx_graph.value import Value, constant
@@ -48,7 +48,7 @@ def model_columns(posterior, readings, size) -> np.ndarray:
     graph = Graph()
     inputs = {name: Value(graph, name) for name in posterior.inputs if name not in MEMORY_INPUTS}
     inputs |= {name: inputs[name].reshape(1, -1) for name in ROW_INPUTS}
-    _, rows = add_residual_rows(posterior.family, posterior.response, inputs)
+    rows = add_residual_rows(posterior.family, posterior.response, inputs)
     basis = monomials(SOIL, posterior.response.terms)
     columns = rows.columns_at(constant(graph, basis[:, None]))
     columns.node("Transpose").node("Compress", rows.used, axis=0).named("out")

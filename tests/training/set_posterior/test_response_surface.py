@@ -8,8 +8,6 @@ import pytest
 from datagen.recipe import read_recipe
 from soilml.errors import InputError
 from soilml.numerics.prior import Prior
-from soilml.physics.model import Model
-from soilml.physics.operating_point import Operating
 from soilml.quantities import SHEAR
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.response_surface import (
@@ -29,18 +27,6 @@ def test_the_error_of_the_response_is_as_declared(wheel_posterior):
     rms = np.sqrt(np.nanmean(off**2, axis=(0, 1)))
     assert (rms < 1.5 * response.error).all()
     assert (response.error < 0.05).all()
-
-
-def test_the_simulated_wheel_is_that_of_the_recipe(wheel_posterior):
-    family = wheel_posterior.family
-    design, x = np.asarray([[0.3, 60.0]]), np.zeros((1, 1, 3))
-    values = {axis.name: float(axis.value(np.zeros(1))[0]) for axis in family.axes}
-    case = family.recipe.case.with_values(values)
-    force = Model(case.model.gear, case.model.effects)(case.soil, Operating(slip=0.3, load=60.0))
-    torque, depth, pull = family.responses(design, x)[0, 0]
-    assert np.isclose(np.exp(torque) * 60.0, force.torque)
-    assert np.isclose(np.exp(depth), force.sinkage)
-    assert np.isclose(pull * 60.0, force.drawbar_pull)
 
 
 def family_with(**priors):

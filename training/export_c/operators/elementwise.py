@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 from soilml.errors import ModelFileError
-from training.export_c.c_text import number
 from training.export_c.program import Node, Program, Translation
 from training.export_c.tensor import REAL, Tensor, broadcast, kind_of
 
 #: Functions of the C library by operator, for double; float has them with an f appended.
 FUNCTIONS = {
-    "Abs": "fabs", "Acos": "acos", "Acosh": "acosh", "Asin": "asin", "Asinh": "asinh",
-    "Atan": "atan", "Atanh": "atanh", "Ceil": "ceil", "Cos": "cos", "Cosh": "cosh", "Erf": "erf",
-    "Exp": "exp", "Floor": "floor", "Log": "log", "Round": "rint", "Sin": "sin", "Sinh": "sinh",
-    "Sqrt": "sqrt", "Tan": "tan", "Tanh": "tanh",
+    "Abs": "fabs", "Asinh": "asinh", "Cos": "cos", "Exp": "exp", "Floor": "floor", "Log": "log",
+    "Sin": "sin", "Sqrt": "sqrt", "Tanh": "tanh",
 }  # fmt: skip
-#: C expressions of the operands; those with a name and braces call a kernel of that name.
-ARITHMETIC = {"Add": "{0} + {1}", "Sub": "{0} - {1}", "Mul": "{0} * {1}", "Div": "{0} / {1}"}
+#: C expressions of the operands, or kernels; of `REPEATED` operators several operands in turn.
 KEEPING = {
-    **ARITHMETIC, "Neg": "-{0}", "Reciprocal": "1 / {0}", "Sigmoid": "sigmoid", "Max": "larger",
-    "Min": "smaller", "Sum": "{0} + {1}", "Where": "{0} ? {1} : {2}",
+    "Add": "{0} + {1}", "Sub": "{0} - {1}", "Mul": "{0} * {1}", "Div": "{0} / {1}", "Neg": "-{0}",
+    "Max": "larger", "Min": "smaller", "Sum": "{0} + {1}", "Where": "{0} ? {1} : {2}",
 }  # fmt: skip
+REPEATED = ("Max", "Min", "Sum")
 TRUTH = {
-    "Equal": "{0} == {1}", "Greater": "{0} > {1}", "GreaterOrEqual": "{0} >= {1}",
-    "Less": "{0} < {1}", "LessOrEqual": "{0} <= {1}", "And": "{0} && {1}", "Or": "{0} || {1}",
-    "Not": "!{0}",
+    "Greater": "{0} > {1}", "GreaterOrEqual": "{0} >= {1}", "Less": "{0} < {1}",
+    "LessOrEqual": "{0} <= {1}", "And": "{0} && {1}", "Or": "{0} || {1}", "Not": "!{0}",
 }  # fmt: skip
 
 
@@ -39,8 +35,6 @@ def translate_function(program: Program, node: Node) -> list[Tensor]:
     """A function of the C library; of many hyperbolic tangents in float, one of our own."""
     x = node.input(0)
     if x.kind not in REAL:
-        if node.kind == "Abs":
-            return _computed(program, x.kind, "{0} < 0 ? -{0} : {0}", [program.stored(x)])
         raise ModelFileError(f"operator {node.kind} of {x.kind} numbers is not known to export-c")
     if node.kind == "Tanh" and x.kind == "float":
         x = program.stored(x)
@@ -55,40 +49,17 @@ def translate_function(program: Program, node: Node) -> list[Tensor]:
 def translate_expression(program: Program, node: Node) -> list[Tensor]:
     """An expression of one, two or three operands, or of several in turn."""
     text, given = KEEPING[node.kind], node.given()
-    if node.kind == "Reciprocal":
-        text = text.replace("1", number(1.0, given[0].kind))
-    if node.kind in ("Max", "Min", "Sum"):
-        first, *others = given
-        for other in others:
-            (first,) = _computed(program, first.kind, text, [first, other])
-        return [first]
-    return _computed(program, given[-1].kind, text, given)
+    if node.kind not in REPEATED:
+        return _computed(program, given[-1].kind, text, given)
+    first, *others = given
+    for other in others:
+        (first,) = _computed(program, first.kind, text, [first, other])
+    return [first]
 
 
 def translate_truth(program: Program, node: Node) -> list[Tensor]:
     """Comparisons and logical operators."""
-    given = node.given()
-    equal = node.kind == "Equal" and given[0].kind in REAL
-    return _computed(program, "bool", "equal" if equal else TRUTH[node.kind], given)
-
-
-def translate_relu(program: Program, node: Node) -> list[Tensor]:
-    """The value, or zero where it is below."""
-    x = node.input(0)
-    name = program.shared.kernel("larger", x.kind)
-    return _computed(program, x.kind, f"{name}({{0}}, {number(0.0, x.kind)})", [x])
-
-
-def translate_power(program: Program, node: Node) -> list[Tensor]:
-    """A power; squares are products."""
-    x, exponent = node.input(0), node.input(1)
-    if exponent.value is not None and exponent.count == 1 and exponent.value.flat[0] == 2.0:
-        x = program.stored(x)
-        return _computed(program, x.kind, "{0} * {1}", [x, x])
-    name = "powf" if x.kind == "float" else "pow"
-    if x.kind not in REAL or exponent.kind != x.kind:
-        raise ModelFileError(f"operator Pow of {x.kind} and {exponent.kind} is not known")
-    return _computed(program, x.kind, f"{name}({{0}}, {{1}})", [x, exponent])
+    return _computed(program, "bool", TRUTH[node.kind], node.given())
 
 
 def translate_clip(program: Program, node: Node) -> list[Tensor]:
@@ -114,8 +85,6 @@ OPERATORS: dict[str, Translation] = {
     **dict.fromkeys(FUNCTIONS, translate_function),
     **dict.fromkeys(KEEPING, translate_expression),
     **dict.fromkeys(TRUTH, translate_truth),
-    "Relu": translate_relu,
-    "Pow": translate_power,
     "Clip": translate_clip,
     "Cast": translate_cast,
 }

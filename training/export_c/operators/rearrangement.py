@@ -109,13 +109,9 @@ def translate_shaping(program: Program, node: Node) -> list[Tensor]:
         if -1 in shape:
             shape[shape.index(-1)] = x.count // max(-prod(shape), 1)
         return [x.seen_as(tuple(shape))]
-    listed = node.numbers(1, "axes")
-    if node.kind == "Squeeze":
-        axes = {a % x.rank for a in listed} if listed is not None else set(range(x.rank))
-        kept = [size for k, size in enumerate(x.shape) if k not in axes or size != 1]
-        return [x.seen_as(tuple(kept))]
-    rank = x.rank + len(listed or [])
-    axes, own = {axis % rank for axis in listed or []}, iter(x.shape)
+    listed = node.numbers(1, "axes") or []
+    rank = x.rank + len(listed)
+    axes, own = {axis % rank for axis in listed}, iter(x.shape)
     return [x.seen_as(tuple(1 if k in axes else next(own) for k in range(rank)))]
 
 
@@ -164,7 +160,7 @@ OPERATORS: dict[str, Translation] = {
     "Gather": translate_gather,
     "Transpose": translate_transpose,
     "Expand": translate_expand,
-    **dict.fromkeys(("Reshape", "Squeeze", "Unsqueeze"), translate_shaping),
+    **dict.fromkeys(("Reshape", "Unsqueeze"), translate_shaping),
     "Identity": translate_identity,
     "Shape": translate_shape,
 }

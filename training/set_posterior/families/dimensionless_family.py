@@ -12,6 +12,7 @@ from soilml.arrays import Floats
 from soilml.config.model_settings import take_prior
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
+from soilml.onboard.set_contract import ABSENT_READING, ABSENT_STD
 from soilml.physics.contact import Force
 from soilml.physics.effects.base import Effect
 from soilml.physics.gears import Wheel
@@ -19,39 +20,71 @@ from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from training.onnx_graph.value import Value, concat, constant, gemm, log, maximum
-from training.set_posterior.families.coordinates import PriorAxis
-from training.set_posterior.families.dimensionless_sets import (
-    BEARING_RANGE,
-    COHESION_SHARE,
-    EXPONENT_RANGE,
-    LEAST_NORMAL_STD,
-    LOAD,
-    MOST_BEARING_STD,
-    RADIUS,
-    REFERENCE_DEPTH,
-    SHEAR_MODULUS_SHARE,
-    simulate_sets,
-)
+from training.set_posterior.families.coordinates import NORMAL_TRUNCATION, PriorAxis
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
-    TYPICAL_ERRORS,
     ContextValues,
+    Origin,
     SimulatedSets,
+    WheelFamily,
     add_log_torque,
-    typical_contact,
+    run_patterns,
     typical_model_errors,
 )
 
+#: Columns of a design: slip, radius (m), width (m), load (N), exponent n, bearing modulus
+#: (N/m^(n+2)), largest cohesion (Pa) and largest shear modulus (m) of the prior.
+SLIP, RADIUS, WIDTH, LOAD, EXPONENT, BEARING, COHESION_MAX, SHEAR_MODULUS_MAX = range(8)
+
+#: Priors of cohesion and shear modulus as shares of their largest values. Below a sixth of it,
+#: torque hardly depends on the shear modulus.
+COHESION_SHARE, SHEAR_MODULUS_SHARE = Prior(0.0, 1.0), Prior(1.0 / 6.0, 1.0)
+
+#: Two nuisance parameters are deviations of the bearing curve from its context inputs: of the
+#: logarithm of pressure at the reference depth, and of the exponent n. A coordinate of 1 is a
+#: deviation by these.
+BEARING_RANGE, EXPONENT_RANGE = 1.0, 0.25
+#: Depth over wheel radius at which the two deviations are independent: a typical sinkage.
+REFERENCE_DEPTH = 0.05
+#: Largest `bearing_std`: the range is `NORMAL_TRUNCATION` = 2.5 of these standard deviations.
+MOST_BEARING_STD = 0.4
+#: Stands for a standard deviation of zero, of which the logarithm is taken (of the coordinate).
+LEAST_NORMAL_STD = 1e-3
+
+
+#: Loads of one set differ by up to this much in their logarithm: a factor of 3.3.
+LOG_LOAD_RANGE = 1.2
+#: Share of sets whose bearing curve is known exactly; the others have at least this `bearing_std`.
+SHARE_KNOWN_BEARING, LEAST_BEARING_STD = 1.0 / 3.0, 0.1
+#: Relative noise of torque, log-uniform; relative noise of sinkage, and of drawbar pull over load.
+TORQUE_NOISE, SINKAGE_NOISE, PULL_NOISE = (0.01, 0.08), 0.05, 0.03
+#: Share of sets with a bias of the torque sensor, and the largest standard deviation of the bias.
+SHARE_BIASED, MOST_BIAS = 1.0 / 3.0, 0.04
+SHARE_ALL_CHANNELS = 0.3  # Share of sets in which sinkage and drawbar pull are measured as well
 #: Designs are drawn beyond the ends of every range by this share of its width, so that readings at
 #: the ends are not extrapolated.
 RANGE_MARGIN = 0.02
 #: Designs that are drawn and tested at a time; a power of two keeps the Sobol sequence balanced.
 CANDIDATES = 1 << 13
+#: Ranges of a spec that designs are drawn from, and context inputs of the graph with their units.
+RANGES = (
+    *("slip", "wheel_radius", "width_over_radius", "load", "n", "pressure_at_1cm"),
+    *("cohesion_max", "shear_modulus_max"),
+)
+CONTEXT = {
+    "wheel_radius": "m",
+    "wheel_width": "m",
+    "bearing_modulus": "N/m^(n+2)",
+    "n": "1",
+    "bearing_std": "1",
+    "cohesion_max": "Pa",
+    "shear_modulus_max": "m",
+}
 
 
 @dataclass(frozen=True)
-class DimensionlessFamily:
+class DimensionlessFamily(WheelFamily):
     """Ranges of wheels, loads and bearing values; a design is (s, r, b, W, n, k, c max, K max).
 
     The response surface has no dimensions. With k the bearing modulus k_c / b + k_phi, torque over
@@ -62,43 +95,24 @@ class DimensionlessFamily:
     ranges: dict[str, Prior]
     sinkage: tuple[float, float]  # range of sinkage over radius of the designs
     pressure: tuple[float, float]  # range of load / (radius width) of the designs, Pa
-    axes: tuple[PriorAxis, ...]
-    targets: int = 3
-    free: int = 3
-    degree: tuple[int, int] = (3, 4)
 
     @staticmethod
     def take(settings: Settings) -> DimensionlessFamily:
         """Read `[any_wheel]` of a spec."""
-        names = (
-            "slip",
-            "wheel_radius",
-            "width_over_radius",
-            "load",
-            "n",
-            "pressure_at_1cm",
-            "cohesion_max",
-            "shear_modulus_max",
-        )
-        ranges = {name: take_prior(settings, name) for name in names}
-        angle = take_prior(settings, "friction_angle")
-        sinkage, pressure = (
-            take_prior(settings, "sinkage_over_radius"),
-            take_prior(settings, "ground_pressure"),
-        )
+        others = ("friction_angle", "sinkage_over_radius", "ground_pressure")
+        ranges = {name: take_prior(settings, name) for name in RANGES}
+        angle, sinkage, pressure = (take_prior(settings, name) for name in others)
         settings.finish()
-        return DimensionlessFamily(
-            ranges,
-            (sinkage.lower, sinkage.upper),
-            (pressure.lower, pressure.upper),
-            (
-                PriorAxis.of("cohesion", COHESION_SHARE),
-                PriorAxis.of("friction_angle", angle),
-                PriorAxis.of("shear_modulus", SHEAR_MODULUS_SHARE),
-                PriorAxis.of("log_bearing_deviation", Prior(-BEARING_RANGE, BEARING_RANGE)),
-                PriorAxis.of("exponent_deviation", Prior(-EXPONENT_RANGE, EXPONENT_RANGE)),
-            ),
-        )
+        priors = {
+            "cohesion": COHESION_SHARE,
+            "friction_angle": angle,
+            "shear_modulus": SHEAR_MODULUS_SHARE,
+            "log_bearing_deviation": Prior(-BEARING_RANGE, BEARING_RANGE),
+            "exponent_deviation": Prior(-EXPONENT_RANGE, EXPONENT_RANGE),
+        }
+        axes = tuple(PriorAxis.of(name, prior) for name, prior in priors.items())
+        ends = ((own.lower, own.upper) for own in (sinkage, pressure))
+        return DimensionlessFamily(axes, 3, 3, (3, 4), ranges, *ends)
 
     def designs(self, count: int, seed: int) -> Floats:
         """Operating conditions (count, 8) whose sinkage and ground pressure are in range.
@@ -129,20 +143,9 @@ class DimensionlessFamily:
     def features(self, designs: Floats) -> Floats:
         """Logarithms of slip, load number, largest cohesion and shear modulus; and n."""
         slip, r, b, load, n, k, c_max, shear_max = designs.T
-        return np.stack(
-            [
-                np.log(slip),
-                np.log(load / (k * b)) - (n + 1.0) * np.log(r),
-                np.log(c_max * r * b / load),
-                np.log(shear_max / r),
-                n,
-            ],
-            axis=1,
-        )
-
-    def sets(self, count: int, rows: int, seed: int) -> SimulatedSets:
-        """See `WheelFamily` and `simulate_sets`."""
-        return simulate_sets(self, self.ranges["slip"], count, rows, seed)
+        load_number = np.log(load / (k * b)) - (n + 1.0) * np.log(r)
+        others = (np.log(c_max * r * b / load), np.log(shear_max / r), n)
+        return np.stack([np.log(slip), load_number, *others], axis=1)
 
     def force(self, designs: Floats, x: Floats, *effects: Effect) -> Force:
         """Forces of the wheel (n, m), with effects, on soils at coordinates x (n, m, p)."""
@@ -158,11 +161,8 @@ class DimensionlessFamily:
         )
         return Model(Wheel(radius=r, width=b), effects)(soil, Operating(slip=slip, load=load))
 
-    def responses(self, designs: Floats, x: Floats) -> Floats:
+    def responses(self, designs: Floats, x: Floats, *effects: Effect) -> Floats:
         """See `WheelFamily`; torque as the logarithm of T / (W r), and the length is the radius."""
-        return self._responses(designs, x)
-
-    def _responses(self, designs: Floats, x: Floats, *effects: Effect) -> Floats:
         force = self.force(designs, x, *effects)
         r, load = designs[:, RADIUS, None], designs[:, LOAD, None]
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -170,51 +170,21 @@ class DimensionlessFamily:
         return np.stack([torque, sinkage, force.drawbar_pull / load], axis=-1)
 
     def inputs(self) -> dict[str, str]:
-        """Context inputs and their units."""
-        return {
-            "wheel_radius": "m",
-            "wheel_width": "m",
-            "bearing_modulus": "N/m^(n+2)",
-            "n": "1",
-            "bearing_std": "1",
-            "cohesion_max": "Pa",
-            "shear_modulus_max": "m",
-        }
+        """See `WheelFamily`."""
+        return CONTEXT
 
     def limits(self) -> dict[str, list[float]]:
         """See `WheelFamily`; combinations of values within them may still be out of range."""
-        r, share, n, p1, c, shear = (
-            (self.ranges[name].lower, self.ranges[name].upper)
-            for name in (
-                "wheel_radius",
-                "width_over_radius",
-                "n",
-                "pressure_at_1cm",
-                "cohesion_max",
-                "shear_modulus_max",
-            )
-        )
-        return {
-            "wheel_radius": list(r),
-            "wheel_width": [r[0] * share[0], r[1] * share[1]],
-            "bearing_modulus": [p1[0] / 0.01 ** n[0], p1[1] / 0.01 ** n[1]],
-            "n": list(n),
-            "bearing_std": [0.0, MOST_BEARING_STD],
-            "cohesion_max": list(c),
-            "shear_modulus_max": list(shear),
-        }
-
-    def typical_errors(self) -> dict[str, float]:
-        """See `WheelFamily`; none of drawbar pull, as loads differ by a factor of a thousand."""
-        return TYPICAL_ERRORS
+        ends = {name: [own.lower, own.upper] for name, own in self.ranges.items()}
+        r, share, n, p1 = (ends[name] for name in (*RANGES[1:3], *RANGES[4:6]))
+        ends["wheel_width"] = [r[k] * share[k] for k in (0, 1)]
+        ends["bearing_modulus"] = [p1[k] / 0.01 ** n[k] for k in (0, 1)]
+        ends["bearing_std"] = [0.0, MOST_BEARING_STD]
+        return {name: ends[name] for name in CONTEXT}
 
     def model_errors(self) -> dict[str, float]:
         """See `WheelFamily`; `bearing_std` is the error of the bearing curve."""
         return typical_model_errors(["cohesion", "kphi", "n"], Model(Wheel(radius=1.0, width=1.0)))
-
-    def contact_changes(self, designs: Floats, x: Floats) -> Floats:
-        """See `WheelFamily`."""
-        return self._responses(designs, x, typical_contact()) - self._responses(designs, x)
 
     def add_context(self, readings: dict[str, Value]) -> ContextValues:
         """See `WheelFamily`; features are linear in the logarithms of the inputs."""
@@ -239,23 +209,19 @@ class DimensionlessFamily:
         torque, torque_slope = add_log_torque(readings, radius)
         features = gemm(constant(graph, of_operating.T), log_operating, shared)
         target_scale = concat([readings[scales[0]], one, readings[scales[1]]], axis=0)
+        middle_pressure = float(np.mean(np.log(self.pressure)))
         return ContextValues(
             features=features,
             feature_slopes=of_operating,
             torque=torque,
             torque_slope=torque_slope,
             torque_by_load=1.0,
-            reference_log_load=log(radius * readings["wheel_width"]) + self._middle_pressure,
+            reference_log_load=log(radius * readings["wheel_width"]) + middle_pressure,
             most_torque_noise=MOST_RELATIVE_NOISE,
             length=radius,
             target_scale=target_scale,
             axis_std=concat([one, one, one, normal_std, normal_std], axis=0).reshape(-1, 1),
         )
-
-    @property
-    def _middle_pressure(self) -> float:
-        """Logarithm of a ground pressure (Pa) in the middle of the range."""
-        return float(np.mean(np.log(self.pressure)))
 
     def metadata(self) -> dict[str, Any]:
         """See `WheelFamily`."""
@@ -268,7 +234,84 @@ class DimensionlessFamily:
             "bearing_std": [0.0, MOST_BEARING_STD],
         }
 
+    def sets(self, count: int, rows: int, seed: int) -> SimulatedSets:
+        """See `WheelFamily`; sets that leave the range of the response surface are left out.
+
+        Bearing values, wheel, noise and the bias of the torque sensor differ from set to set.
+        Relative torque noise is 1 to 8 %; a third of the sets has a bias with a standard deviation
+        of up to 4 %. The bearing curve is known exactly in a third of the sets, and up to a factor
+        of 1.1 to 1.5 in the others.
+        """
+        rng = np.random.default_rng((seed, rows))
+        base = self.designs(count, seed + rows)
+        designs = np.repeat(base[:, None], rows, axis=1)
+        designs[..., SLIP] = self.ranges["slip"].at(run_patterns(count, rows, rng))
+        designs[..., LOAD] *= np.exp(LOG_LOAD_RANGE * (run_patterns(count, rows, rng) - 0.5))
+        x, bearing_std = self._draw_unknowns(count, rng)
+        flat = designs.reshape(-1, base.shape[1])
+        y = self.responses(flat, np.repeat(x, rows, axis=0)[:, None]).reshape(count, rows, 3)
+        lower, upper = (end(self.features(base), axis=0) for end in (np.min, np.max))
+        features = self.features(flat).reshape(count, rows, -1)
+        kept = ((features > lower) & (features < upper)).all(axis=(1, 2))
+        kept &= np.isfinite(y).all(axis=(1, 2))
+        designs, y, x, bearing_std = designs[kept], y[kept], x[kept], bearing_std[kept]
+        load, radius = designs[..., LOAD], designs[..., RADIUS]
+        values = {
+            "torque": np.exp(y[..., 0]) * load * radius,
+            "sinkage": np.exp(y[..., 1]) * radius,
+            "drawbar_pull": y[..., 2] * load,
+        }
+        readings, noise = _measure(values, designs, rng)
+        columns = (RADIUS, WIDTH, BEARING, EXPONENT, None, COHESION_MAX, SHEAR_MODULUS_MAX)
+        context = {
+            name: bearing_std if k is None else designs[:, 0, k]
+            for name, k in zip(CONTEXT, columns, strict=True)
+        }
+        truth = self.truth(x, (context["cohesion_max"], 1.0, context["shear_modulus_max"]))
+        origin = Origin(designs, x, bearing_std / BEARING_RANGE, radius[:, 0], noise)
+        return SimulatedSets(readings, context, truth, origin)
+
+    def _draw_unknowns(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        """Coordinates (count, p) of the prior, and `bearing_std` (count,)."""
+        known = rng.random(count) < SHARE_KNOWN_BEARING
+        std = np.where(known, 0.0, rng.uniform(LEAST_BEARING_STD, MOST_BEARING_STD, count))
+        x = np.stack([a.quantile(rng.random(count)) for a in self.axes[: self.free]], axis=1)
+        normal = np.clip(rng.standard_normal((count, 2)), -NORMAL_TRUNCATION, NORMAL_TRUNCATION)
+        return np.concatenate([x, normal * std[:, None] / BEARING_RANGE], axis=1), std
+
     def described(self) -> str:
         """See `WheelFamily`."""
         said = (f"{name} {own.lower:g} to {own.upper:g}" for name, own in self.ranges.items())
         return f"[any_wheel] {', '.join(said)}"
+
+
+def _measure(
+    values: dict[str, Floats], designs: Floats, rng: np.random.Generator
+) -> tuple[dict[str, Floats], dict[str, tuple[Floats, Floats]]]:
+    """Readings with noise, and their noise as in `Origin`, of true values (sets, rows)."""
+    load, sets = designs[..., LOAD], len(designs)
+    least, most = TORQUE_NOISE
+    torque_noise = np.exp(rng.uniform(np.log(least), np.log(most), (sets, 1)))
+    biased = rng.random((sets, 1)) < SHARE_BIASED
+    bias = np.where(biased, rng.uniform(0.0, MOST_BIAS, (sets, 1)), 0.0)
+    all_channels = rng.random((sets, 1)) < SHARE_ALL_CHANNELS
+    stds = {
+        "torque": torque_noise * values["torque"],
+        "sinkage": SINKAGE_NOISE * values["sinkage"],
+        "drawbar_pull": PULL_NOISE * load,
+    }
+    readings = {"slip": designs[..., SLIP], "load": load, "torque_bias": bias * values["torque"]}
+    for name, value in values.items():
+        measured = all_channels | (name == "torque")
+        noisy = value + stds[name] * rng.standard_normal(value.shape)
+        readings[name] = np.where(measured, noisy, ABSENT_READING)
+        readings[f"{name}_std"] = np.where(measured, stds[name], ABSENT_STD)
+    readings["torque"] += readings["torque_bias"] * rng.standard_normal((sets, 1))
+    none = np.zeros_like(load)
+    noise = {
+        "torque": (none, torque_noise + none),
+        "sinkage": (none, SINKAGE_NOISE + none),
+        "drawbar_pull": (PULL_NOISE * load, none),
+        "torque_bias": (none, bias + none),
+    }
+    return readings, noise

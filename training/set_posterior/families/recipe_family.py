@@ -29,13 +29,12 @@ from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
-    TYPICAL_ERRORS,
     ContextValues,
     Origin,
     SimulatedSets,
+    WheelFamily,
     add_log_torque,
     run_patterns,
-    typical_contact,
     typical_model_errors,
 )
 
@@ -56,14 +55,10 @@ ANY_NOISE = 1e5
 
 
 @dataclass(frozen=True)
-class RecipeFamily:
+class RecipeFamily(WheelFamily):
     """Gear and effects of a recipe on soils of its prior; a design is (slip, load)."""
 
     recipe: Recipe
-    axes: tuple[PriorAxis, ...]
-    targets: int
-    free: int
-    degree: tuple[int, int]
     linear_torque: float = 0.0  # N m, below which the torque scale is nearly linear; 0: logarithm
 
     @staticmethod
@@ -75,28 +70,27 @@ class RecipeFamily:
         """
         prior = recipe.case.prior
         names = [*targets, *(name for name in prior if name not in targets)]
+        said = ""
         if missing := [name for name in targets if name not in prior]:
-            raise InputError(f"set_posterior: the recipe has no prior of {missing[0]}")
-        if recipe.case.remainder is not None:
-            raise InputError(
-                "set_posterior: the recipe has [remainder], an error of its model that the graph "
-                "has no columns for; needed is a recipe without it, or a spec without "
-                "[set_posterior], whose regressors learn it from the rows"
+            said = f"no prior of {missing[0]}"
+        elif recipe.case.remainder is not None:
+            said = (
+                "[remainder], an error of its model that the graph has no columns for; needed is a "
+                "recipe without it, or a spec without [set_posterior], whose regressors learn it "
+                "from the rows"
             )
-        if len(names) > MOST_UNKNOWNS:
-            raise InputError(
-                f"set_posterior: the recipe has {len(names)} unknowns; needed are {MOST_UNKNOWNS} "
-                "or fewer"
+        elif len(names) > MOST_UNKNOWNS:
+            said = f"{len(names)} unknowns; needed are {MOST_UNKNOWNS} or fewer"
+        elif recipe.slip.lower <= 0.0 or recipe.covariates or recipe.gear_sensors:
+            said = (
+                "slip of 0 or less, covariates or stick-slip; needed are slip above 0 and torque "
+                "that depends on slip, load and soil alone; remove [set_posterior] from the spec"
             )
-        if recipe.slip.lower <= 0.0 or recipe.covariates or recipe.gear_sensors:
-            raise InputError(
-                "set_posterior: the recipe has slip of 0 or less, covariates or stick-slip; needed "
-                "are slip above 0 and torque that depends on slip, load and soil alone; remove "
-                "[set_posterior] from the spec"
-            )
+        if said:
+            raise InputError(f"set_posterior: the recipe has {said}")
         axes = tuple(PriorAxis.of(name, prior[name]) for name in names)
         degree = (4, 4) if len(axes) <= FEW_UNKNOWNS else (3, 4)
-        family = RecipeFamily(recipe, axes, len(targets), len(axes), degree)
+        family = RecipeFamily(axes, len(targets), len(axes), degree, recipe)
         noise = recipe.case.noise.get(column("torque"), Noise(share=1.0))
         if noise.constant == 0.0:
             return family
@@ -107,15 +101,15 @@ class RecipeFamily:
         u = qmc.Sobol(2, rng=seed).random(1 << (count - 1).bit_length())[:count]
         u = u * (1.0 + 2.0 * RANGE_MARGIN) - RANGE_MARGIN
         slip = self.recipe.slip.at(u[:, 0])
-        load = self.recipe.load.at(u[:, 1])
         slip = np.clip(slip, 0.5 * self.recipe.slip.lower, 0.999)
-        return np.stack([slip, np.maximum(load, 0.5 * self.recipe.load.lower)], axis=1)
+        load = np.maximum(self.recipe.load.at(u[:, 1]), 0.5 * self.recipe.load.lower)
+        return np.stack([slip, load], axis=1)
 
     def features(self, designs: Floats) -> Floats:
         """Logarithms of slip and load."""
         return np.log(designs)
 
-    def responses(self, designs: Floats, x: Floats) -> Floats:
+    def responses(self, designs: Floats, x: Floats, *effects: Effect) -> Floats:
         r"""See `WheelFamily`; the length is 1 m.
 
         Torque is on a logarithmic scale, log(T / W), if its noise is relative, and else on the
@@ -128,10 +122,6 @@ class RecipeFamily:
         polynomial of the unknowns; and the noise computed from a reading is then within 5 % of
         that computed from the true torque.
         """
-        return self._responses(designs, x)
-
-    def _responses(self, designs: Floats, x: Floats, *effects: Effect) -> Floats:
-        """The responses with further effects."""
         case = self.recipe.case.with_values(
             {axis.name: axis.value(x[..., i]) for i, axis in enumerate(self.axes)}
         )
@@ -145,26 +135,14 @@ class RecipeFamily:
                 torque = np.log(force.torque / load)
             return np.stack([torque, np.log(force.sinkage), force.drawbar_pull / load], axis=-1)
 
-    def inputs(self) -> dict[str, str]:
-        """None: all context is fixed by the recipe."""
-        return {}
-
-    def limits(self) -> dict[str, list[float]]:
-        """None, as there are no context inputs."""
-        return {}
-
     def typical_errors(self) -> dict[str, float]:
         """See `WheelFamily`."""
         load = float(self.recipe.load.at(np.asarray(0.5)))
-        return TYPICAL_ERRORS | {"drawbar_pull_bias": PULL_OFFSET_SHARE * load}
+        return super().typical_errors() | {"drawbar_pull_bias": PULL_OFFSET_SHARE * load}
 
     def model_errors(self) -> dict[str, float]:
         """See `WheelFamily`."""
         return typical_model_errors([axis.name for axis in self.axes], self.recipe.case.model)
-
-    def contact_changes(self, designs: Floats, x: Floats) -> Floats:
-        """See `WheelFamily`."""
-        return self._responses(designs, x, typical_contact()) - self._responses(designs, x)
 
     def add_context(self, readings: dict[str, Value]) -> ContextValues:
         """See `WheelFamily`."""
@@ -201,7 +179,7 @@ class RecipeFamily:
         readings = {"slip": slip, "load": load}
         all_channels = rng.random((len(x), 1)) < SHARE_ALL_CHANNELS
         for name, value in zip(RESPONSE_CHANNELS, values, strict=True):
-            noise = self.recipe.case.noise.get(column(name))
+            noise = self._noise.get(name)
             measured = (noise is not None) & (all_channels | (name == "torque"))
             std = np.full_like(value, ABSENT_STD) if noise is None else noise.std(value)
             noisy = value + std * rng.standard_normal(std.shape)
@@ -210,15 +188,20 @@ class RecipeFamily:
         bias = self.recipe.bias.get(column("torque"), Noise())
         readings["torque_bias"] = bias.std(torque)
         readings["torque"] += readings["torque_bias"] * rng.standard_normal((len(x), 1))
-        truth = [axis.value(x[:, i]) for i, axis in enumerate(self.axes[: self.targets])]
-        origin = Origin(
-            designs=np.stack([slip, load], axis=-1),
-            x=x,
-            normal_std=np.zeros(len(x)),
-            length=np.ones(len(x)),
-            noise=self._noise(bias, slip.shape),
-        )
-        return SimulatedSets(readings, {}, np.stack(truth, axis=1), origin)
+        named = self._noise | {"torque_bias": bias}
+        parts = {
+            name: (np.full(slip.shape, float(own.constant)), np.full(slip.shape, float(own.share)))
+            for name, own in named.items()
+        }
+        designs, none = np.stack([slip, load], axis=-1), np.zeros(len(x))
+        origin = Origin(designs, x, normal_std=none, length=none + 1.0, noise=parts)
+        return SimulatedSets(readings, {}, self.truth(x), origin)
+
+    @property
+    def _noise(self) -> dict[str, Noise]:
+        """Noise of the recipe by channel."""
+        named = {name: self.recipe.case.noise.get(column(name)) for name in RESPONSE_CHANNELS}
+        return {name: noise for name, noise in named.items() if noise}
 
     def _carried_sets(
         self, count: int, rows: int, rng: np.random.Generator
@@ -229,8 +212,8 @@ class RecipeFamily:
         """
         found: list[tuple[Floats, Floats, Floats, Floats]] = []
         for _ in range(MOST_ROUNDS):
-            slip = self.recipe.slip.at(run_patterns(count, rows, rng))
-            load = self.recipe.load.at(run_patterns(count, rows, rng))
+            ranges = (self.recipe.slip, self.recipe.load)
+            slip, load = (own.at(run_patterns(count, rows, rng)) for own in ranges)
             x = np.stack([axis.quantile(rng.random(count)) for axis in self.axes], axis=1)
             y = self.responses(
                 np.stack([slip, load], axis=-1).reshape(-1, 2), np.repeat(x, rows, axis=0)[:, None]
@@ -242,20 +225,10 @@ class RecipeFamily:
         slip, load, y, x = (np.concatenate(part)[:count] for part in zip(*found, strict=True))
         return slip, load, y, x
 
-    def _noise(self, bias: Noise, shape: tuple[int, ...]) -> dict[str, tuple[Floats, Floats]]:
-        """Noise as in `Origin`, of the channels that the recipe has noise for, and of the bias."""
-        named = {name: self.recipe.case.noise.get(column(name)) for name in RESPONSE_CHANNELS}
-        return {
-            name: (np.full(shape, float(noise.constant)), np.full(shape, float(noise.share)))
-            for name, noise in (named | {"torque_bias": bias}).items()
-            if noise
-        }
-
     def declared_noise(self) -> dict[str, list[float]]:
         """Noise of the recipe as the file's own: constant part and share, by channel, and bias."""
-        channels = (*RESPONSE_CHANNELS, *OPERATING_NOISE)
-        named = {name: self.recipe.case.noise.get(column(name)) for name in channels}
-        named["torque_bias"] = self.recipe.bias.get(column("torque"))
+        named = {name: self.recipe.case.noise.get(column(name)) for name in OPERATING_NOISE}
+        named = {**self._noise, **named, "torque_bias": self.recipe.bias.get(column("torque"))}
         return {name: [noise.constant, noise.share] for name, noise in named.items() if noise}
 
     def metadata(self) -> dict[str, Any]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from soilml.arrays import Floats
 from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, USUAL_SENSOR_ERRORS, without_errors
 from soilml.onboard.set_contract import INFERRED, LEAST_STD
-from soilml.physics.effects.exit_angle import ExitAngle
+from soilml.physics.effects.base import Effect
+from soilml.physics.effects.contact_shape import ExitAngle
 from soilml.physics.model import Model
 from training.onnx_graph.value import Value, log, maximum, minimum
 from training.set_posterior.families.coordinates import PriorAxis
@@ -90,20 +92,14 @@ class SimulatedSets:
 
     def select(self, index: int) -> SimulatedSets:
         """One of the sets."""
-        origin, part = self.origin, slice(index, index + 1)
-        noise = {name: (a[part], b[part]) for name, (a, b) in origin.noise.items()}
-        return SimulatedSets(
-            {name: values[part] for name, values in self.readings.items()},
-            {name: values[part] for name, values in self.context.items()},
-            self.truth[part],
-            Origin(
-                origin.designs[part],
-                origin.x[part],
-                origin.normal_std[part],
-                origin.length[part],
-                noise,
-            ),
+        o, part = self.origin, slice(index, index + 1)
+        noise = {name: (a[part], b[part]) for name, (a, b) in o.noise.items()}
+        readings, context = (
+            {name: values[part] for name, values in own.items()}
+            for own in (self.readings, self.context)
         )
+        own = Origin(o.designs[part], o.x[part], o.normal_std[part], o.length[part], noise)
+        return SimulatedSets(readings, context, self.truth[part], own)
 
 
 def add_log_torque(readings: dict[str, Value], length: Value | float) -> tuple[Value, Value]:
@@ -122,7 +118,8 @@ def add_log_torque(readings: dict[str, Value], length: Value | float) -> tuple[V
     return log(torque_ratio) + correction, 1.0 / torque
 
 
-class WheelFamily(Protocol):
+@dataclass(frozen=True)
+class WheelFamily(ABC):
     """Wheels on soils: operating conditions, response of the wheel, and its inputs in a graph.
 
     A design is one operating condition of one wheel, a row (n, d) of numbers that the family
@@ -130,84 +127,76 @@ class WheelFamily(Protocol):
     anywhere in their range, and last nearly known nuisance parameters with a normal prior around 0.
     """
 
-    @property
-    def axes(self) -> tuple[PriorAxis, ...]:
-        """All unknowns."""
-        ...
+    axes: tuple[PriorAxis, ...]  # all unknowns
+    targets: int  # number of axes that are estimated
+    free: int  # number of axes that lie anywhere in their range; the others have a normal prior
+    degree: tuple[int, int]  # of the polynomial, and of its terms of the estimated axes alone
 
-    @property
-    def targets(self) -> int:
-        """Number of axes that are estimated."""
-        ...
-
-    @property
-    def free(self) -> int:
-        """Number of axes that lie anywhere in their range; the others have a normal prior."""
-        ...
-
-    @property
-    def degree(self) -> tuple[int, int]:
-        """Degree of the polynomial, and of its terms of the estimated axes alone."""
-        ...
-
+    @abstractmethod
     def designs(self, count: int, seed: int) -> Floats:
         """Operating conditions (count, d) that the soil carries, spread over the range."""
-        ...
 
+    @abstractmethod
     def features(self, designs: Floats) -> Floats:
         """Inputs of the response surface, smooth and of order one, (n, f)."""
-        ...
 
-    def responses(self, designs: Floats, x: Floats) -> Floats:
-        """Channels (n, m, 3) at coordinates x (n, m, p).
+    @abstractmethod
+    def responses(self, designs: Floats, x: Floats, *effects: Effect) -> Floats:
+        """Channels (n, m, 3) at coordinates x (n, m, p), with further effects of the model.
 
         They are a rising function of torque along which its noise is nearly constant, the logarithm
         of sinkage over length, and drawbar pull over load; NaN without equilibrium.
         """
-        ...
 
-    def inputs(self) -> dict[str, str]:
-        """Context inputs of the graph, of all rows of a set: name -> unit."""
-        ...
-
-    def limits(self) -> dict[str, list[float]]:
-        """Least and largest value of each context input."""
-        ...
-
-    def typical_errors(self) -> dict[str, float]:
-        """Typical standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`."""
-        ...
-
+    @abstractmethod
     def model_errors(self) -> dict[str, float]:
         """Typical standard deviations of errors of the model, by `MODEL_ERROR_COLUMNS`.
 
         Nil for what is an unknown of the family, or an effect of its model.
         """
-        ...
+
+    @abstractmethod
+    def add_context(self, readings: dict[str, Value]) -> ContextValues:
+        """Add nodes that compute the context from readings (1, rows) and from `inputs`."""
+
+    @abstractmethod
+    def sets(self, count: int, rows: int, seed: int) -> SimulatedSets:
+        """Sets of rows under operating conditions of a rover, with noise; soils of the prior."""
+
+    @abstractmethod
+    def metadata(self) -> dict[str, Any]:
+        """Ranges and axes, for the file and its card."""
+
+    @abstractmethod
+    def described(self) -> str:
+        """Slips, loads and soils as a user wrote them, for messages."""
+
+    def inputs(self) -> dict[str, str]:
+        """Context inputs of the graph, of all rows of a set: name -> unit."""
+        return {}
+
+    def limits(self) -> dict[str, list[float]]:
+        """Least and largest value of each context input."""
+        return {}
+
+    def typical_errors(self) -> dict[str, float]:
+        """Typical standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`."""
+        return TYPICAL_ERRORS
 
     def contact_changes(self, designs: Floats, x: Floats) -> Floats:
         """Changes of the channels (n, m, 3) where the rim touches the soil behind the axle too.
 
-        That is with the effect `exit-angle` at its typical size. It is called only if this is
-        one of the errors of the model.
+        That is with the effect `exit-angle` at its typical size.
         """
-        ...
+        touching = ExitAngle(**ExitAngle.about.reference)
+        return self.responses(designs, x, touching) - self.responses(designs, x)
 
-    def add_context(self, readings: dict[str, Value]) -> ContextValues:
-        """Add nodes that compute the context from readings (1, rows) and from `inputs`."""
-        ...
-
-    def sets(self, count: int, rows: int, seed: int) -> SimulatedSets:
-        """Sets of rows under operating conditions of a rover, with noise; soils of the prior."""
-        ...
-
-    def metadata(self) -> dict[str, Any]:
-        """Ranges and axes, for the file and its card."""
-        ...
-
-    def described(self) -> str:
-        """Slips, loads and soils as a user wrote them, for messages."""
-        ...
+    def truth(self, x: Floats, scale: Sequence[Floats | float] = ()) -> Floats:
+        """Estimated parameters (n, q) at coordinates x (n, p), times the scale of each."""
+        values = [axis.value(x[:, i]) for i, axis in enumerate(self.axes[: self.targets])]
+        return np.stack(
+            [v * s for v, s in zip(values, scale or [1.0] * len(values), strict=True)], 1
+        )
 
 
 def run_patterns(count: int, rows: int, rng: np.random.Generator) -> Floats:
@@ -221,11 +210,6 @@ def run_patterns(count: int, rows: int, rng: np.random.Generator) -> Floats:
     constant = np.repeat(rng.random((count, 1)), rows, axis=1)
     pattern = rng.integers(4, size=(count, 1))
     return np.where(pattern < 2, independent, np.where(pattern == 2, levels, constant))
-
-
-def typical_contact() -> ExitAngle:
-    """The effect `exit-angle` at its typical size."""
-    return ExitAngle(**ExitAngle.about.reference)
 
 
 def typical_model_errors(unknown: Sequence[str], model: Model) -> dict[str, float]:
