@@ -84,9 +84,8 @@ def read_table(
     Parameters
     ----------
     path
-        A Parquet file where the name ends in `.parquet`, a folder of Parquet files that `soilml
-        generate` wrote, a spreadsheet (.xlsx, or BOOK.xlsx#SHEET where it has several sheets),
-        otherwise a CSV file with a header and comma as separator. Column names carry their units,
+        A Parquet file where the name ends in `.parquet`, a spreadsheet (.xlsx, or BOOK.xlsx#SHEET
+        where it has several sheets), otherwise a CSV file with a header and comma as separator. Column names carry their units,
         such as load_N and torque_Nm. Data frames of pandas, polars and pyarrow, and whatever else
         exports an Arrow stream, are read with the same checks; `Table.to_arrow` gives one back.
     need
@@ -138,7 +137,7 @@ def read_table(
 
     try:
         refuse_device(split_sheet(file)[0])
-        if file.suffix == ".parquet" or file.is_dir():
+        if file.suffix == ".parquet":
             found, metadata = read_parquet(file)
             table = _of_arrow(file, found, ignore_extra, metadata)
         elif is_spreadsheet(file):
