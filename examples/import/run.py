@@ -34,7 +34,7 @@ def picture(logs: list[str], chart: Path, target: Path) -> None:
         figure = plt.figure(figsize=(15.2, 4.8), layout="constrained")
         first, second, third = figure.subfigures(1, 3)
         for canvas, series in zip((first, second), imported.series[::3], strict=False):
-            draw_run(series, imported.table, canvas.subplots(run_panels(series), 1))
+            draw_run(series, imported.table, canvas.subplots(len(run_panels(series)), 1))
         shown = panels_over_slip(imported.table, imported.radius)[:2]
         for axes, panel in zip(third.subplots(2, 1, sharex=True), shown, strict=True):
             draw_over_slip(axes, imported.table, panel)

@@ -277,7 +277,8 @@ def picture(files: list[Path], target: Path) -> None:
     imported = import_log(files, FOLDER / "map.toml")
     with report_style():
         series = imported.series[2]
-        figure, axes = plt.subplots(run_panels(series), 1, figsize=(9.0, 5.2), layout="constrained")
+        count = len(run_panels(series))
+        figure, axes = plt.subplots(count, 1, figsize=(9.0, 5.2), layout="constrained")
         draw_run(series, imported.table, axes)
         figure.axes[-1].set_xlabel("time, s; each blue stretch is a stance")
         figure.savefig(target, dpi=80, facecolor="white")

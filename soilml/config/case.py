@@ -31,8 +31,9 @@ from soilml.config.simulator import (
     take_simulator,
     with_emulator_error,
 )
-from soilml.config.wheeled_rover import DriveErrors, WheeledRover, take_drive, take_rover
+from soilml.config.wheeled_rover import DriveErrors, WheeledRover, take_rover
 from soilml.errors import InputError
+from soilml.io.declared_settings import take_declared
 from soilml.io.named_files import NamedFiles
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings, read_settings
@@ -47,55 +48,33 @@ from soilml.quantities import COLUMNS
 
 @dataclass(frozen=True)
 class Case:
-    """A model on a soil, with priors, sensor noise and model discrepancy.
+    """A model on a soil, with priors, sensor noise and model discrepancy."""
 
-    Attributes
-    ----------
-    model
-        Gear and effects.
-    soil
-        Soil parameters.
-    prior
-        Priors by the paths of `parameters()`: `cohesion`, `kphi`, `slip-sinkage.n1`.
-    noise
-        Noise of the sensors by column name: `torque_Nm`, `slip`.
-    discrepancy
-        Smooth error of the model by column name: `torque_Nm`, `drawbar_pull_N`, `sinkage_m`.
-    gears
-        Where several gears were driven: each by its name in the column `gear` of a table, with the
-        effects of its own; `model` has the effects that all share, on the first gear. A gear's own
-        effect replaces a shared one of the same name. Empty where there is one gear.
-    bias
-        Errors that all readings of a sensor share, by column name: `torque_Nm`, `slip`.
-    rover
-        The vehicle on such gears, where the file describes it.
-    soil_tests
-        Plate and shear tests of the soil, which take part like further readings.
-    remainder
-        What a gap analysis learned of the readings that soil and effects do not explain; its mean
-        is a part of every prediction.
-    simulator
-        Another program whose runs stand in for the equations; the error of their emulator is a part
-        of `discrepancy`.
-    drive
-        What the rover's drives report beside the torque on the soil.
-    explanations
-        Explanations of a gap analysis with their probabilities; empty where the case is the whole
-        answer. Every prediction is their mixture, beside the one remainder.
-    """
-
-    model: Model
+    model: Model  # Gear and effects
     soil: Soil
+    # Priors by the paths of `parameters()`: `cohesion`, `kphi`, `slip-sinkage.n1`
     prior: dict[str, Prior] = field(default_factory=dict)
+    # Noise of the sensors by column name: `torque_Nm`, `slip`
     noise: dict[str, Noise] = field(default_factory=dict)
+    # Smooth error of the model by column name: `torque_Nm`, `drawbar_pull_N`, `sinkage_m`
     discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
+    # Where several gears were driven: each by its name in the column `gear` of a table, with the
+    # effects of its own; `model` has the effects that all share, on the first gear. A gear's own
+    # effect replaces a shared one of the same name. Empty where there is one gear
     gears: dict[str, Model] = field(default_factory=dict)
+    # Errors that all readings of a sensor share, by column name: `torque_Nm`, `slip`
     bias: dict[str, Noise] = field(default_factory=dict)
-    rover: WheeledRover | None = None
-    soil_tests: tuple[SoilTest, ...] = ()
+    rover: WheeledRover | None = None  # The vehicle on such gears, where the file describes it
+    soil_tests: tuple[SoilTest, ...] = ()  # Plate and shear tests, which take part like readings
+    # What a gap analysis learned of the readings that soil and effects do not explain; its mean is
+    # a part of every prediction
     remainder: Remainder | None = None
+    # Another program whose runs stand in for the equations; the error of their emulator is a part
+    # of `discrepancy`
     simulator: Simulator | None = None
-    drive: DriveErrors = field(default_factory=DriveErrors)
+    drive: DriveErrors = field(default_factory=DriveErrors)  # Of drives: beside the torque on soil
+    # Explanations of a gap analysis with their probabilities, whose mixture is every prediction,
+    # beside the one remainder; empty where the case is the whole answer
     explanations: tuple[CaseExplanation, ...] = ()
 
     @property
@@ -162,12 +141,11 @@ class Case:
             CaseExplanation.of(e.weight, self.of_explanation(e).of_gear(name))
             for e in self.explanations
         )
-        case = replace(
-            self, model=model, prior={}, gears={}, remainder=remainder, explanations=each
-        )
         paths = self.paths_of_gear(name)
         prior = {paths[path]: prior for path, prior in self.prior.items() if path in paths}
-        return replace(case, prior=prior)
+        return replace(
+            self, model=model, prior=prior, gears={}, remainder=remainder, explanations=each
+        )
 
     def without_remainder_of(self, table: Table) -> Case:
         """Without a remainder that was learned from rows of a table, which would count twice."""
@@ -317,17 +295,17 @@ def case_of_one_gear(case: Case, path: str | os.PathLike[str], gear: str | None)
     """The case of the gear of this name, of the file `path`; raises as `read_case_of_one_gear`."""
     if not case.gears and gear is None:
         return case
+    if gear in case.gears:
+        return case.of_gear(gear)
     known = ", ".join(case.gears)
     if not case.gears:
         raise InputError(f"{path} has one gear, in [gear]; omit --gear")
-    if gear is None:
-        raise InputError(
-            f"{path} has several gears: {known}; choose one with --gear, which also selects its "
-            "rows, where the table has a column gear"
-        )
-    if gear not in case.gears:
+    if gear is not None:
         raise InputError(f"{path} has no gear {gear!r}; there are: {known}")
-    return case.of_gear(gear)
+    raise InputError(
+        f"{path} has several gears: {known}; choose one with --gear, which also selects its rows, "
+        "where the table has a column gear"
+    )
 
 
 def take_case(
@@ -363,34 +341,21 @@ def take_case(
                     "the others, as [[gears.NAME.effect]]"
                 )
     prior |= effect_priors | gear_priors
-    noise = {}
-    noise_settings = settings.table("noise")
-    noise_settings.permit(COLUMNS)
-    for key in COLUMNS:
-        if key in noise_settings:
-            noise[key] = take_noise(noise_settings, key)
-    noise_settings.finish()
+    of_noise = settings.table("noise")
+    of_noise.permit(COLUMNS)
+    noise = {key: take_noise(of_noise, key) for key in COLUMNS if key in of_noise}
+    of_noise.finish()
     discrepancy = take_discrepancy(settings.table("discrepancy"))
     if simulator is not None:
         simulator = replace(simulator, states_discrepancy=bool(discrepancy))
         discrepancy = with_emulator_error(discrepancy, simulator.error)
-    rover = (
-        take_rover(settings.table("rover"), gears or {"": model}) if "rover" in settings else None
-    )
-    remainder = None
-    if "remainder" in settings:
-        remainder = take_remainder(settings.table("remainder"), gears)
     case = Case(
-        model,
-        own_soil,
-        prior,
-        noise,
-        discrepancy,
-        gears,
-        rover=rover,
-        soil_tests=soil_tests,
-        remainder=remainder,
-        simulator=simulator,
-        drive=take_drive(settings.table("drive")) if "drive" in settings else DriveErrors(),
-    )
+        model, own_soil, prior, noise, discrepancy, gears,
+        soil_tests=soil_tests, simulator=simulator,
+        drive=take_declared(DriveErrors, settings.table("drive")),
+    )  # fmt: skip
+    if "rover" in settings:
+        case = replace(case, rover=take_rover(settings.table("rover"), gears or {"": model}))
+    if "remainder" in settings:
+        case = replace(case, remainder=take_remainder(settings.table("remainder"), gears))
     return take_explanations(settings, effects, case, (*suspected, *of_gears))

@@ -35,19 +35,14 @@ def recipe_content(text: str, source: str) -> dict[str, Any]:
         content = json.loads(text, parse_int=float)
     except (ValueError, RecursionError):
         content = None
-    if not (isinstance(content, dict) and _names_effects(content.get("effect", []))):
+    effects = content.get("effect", []) if isinstance(content, dict) else None
+    # names are printed, also those that are not known here
+    entries = effects if isinstance(effects, list) else [None]
+    names = [entry.get("name") if isinstance(entry, dict) else None for entry in entries]
+    named = all(isinstance(name, str) and not fault_of_text(name) for name in names)
+    if not (isinstance(content, dict) and named):
         raise InputError(f"{source}: its recipe is damaged; generate or train it again")
     return content
-
-
-def _names_effects(entries: Any) -> bool:
-    """Whether these are tables with names; they are printed, also those that are not known here."""
-    return isinstance(entries, list) and all(
-        isinstance(entry, dict)
-        and isinstance(name := entry.get("name"), str)
-        and not fault_of_text(name)
-        for entry in entries
-    )
 
 
 def recipe_case(text: str, source: str) -> Case | None:
@@ -96,21 +91,16 @@ def check_wheel_size(case: Case, table: Table) -> None:
             f"{table.source}: column gear names {', '.join(filter(None, names))}, and the model "
             "has one gear; write each as [gears.NAME], or select rows with --gear NAME"
         )
-    _check_sinkage(case, table)
-    sizes = {name: getattr(case.model.gear, name, None) for name in ("radius", "width")}
-    hint = "select rows with --where run=NAME, or correct [gear]"
-    check_wheel_columns(table, sizes, "the model's wheel has", hint)
-
-
-def _check_sinkage(case: Case, table: Table) -> None:
-    """Raise `TableError` for a sinkage beyond the diameter of the gear: it is not in metres."""
     key, diameter = QUANTITIES["sinkage"].column, 2.0 * float(case.model.gear.radius)
-    if key in table and (wrong := np.abs(table[key]) > diameter).any():
+    if key in table and (wrong := np.abs(table[key]) > diameter).any():  # it is not in metres
         row = int(np.argmax(wrong))
         raise TableError(
             f"{table.place(row)}, column {key}: {table[key][row]:g} given, more than the diameter "
             f"of the gear, {diameter:g} m; convert it to m"
         )
+    sizes = {name: getattr(case.model.gear, name, None) for name in ("radius", "width")}
+    hint = "select rows with --where run=NAME, or correct [gear]"
+    check_wheel_columns(table, sizes, "the model's wheel has", hint)
 
 
 def _check_gear_names(case: Case, table: Table) -> None:
@@ -142,8 +132,7 @@ def gear_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[st
 
 def value_differences(case: Case, other: Case) -> Iterator[str]:
     """Differences of the fixed values of soil and effects; what `other` varies has no value."""
-    yield from soil_value_differences(case, other)
-    yield from effect_value_differences(case, other)
+    yield from (*soil_value_differences(case, other), *effect_value_differences(case, other))
 
 
 def soil_value_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[str]:
@@ -162,7 +151,8 @@ def effect_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[
     """The effects of both, where their names differ."""
     own, others = ({effect.name for effect in c.model.effects} for c in (case, other))
     if own != others:
-        yield f"effects {_join(others)}, {owner} has {_join(own)}"
+        shown = [", ".join(sorted(names)) or "none" for names in (others, own)]
+        yield f"effects {shown[0]}, {owner} has {shown[1]}"
 
 
 def prior_differences(
@@ -198,7 +188,3 @@ def _fixed_differences(
 
 def _is_close(a: float, b: float, tolerance: float) -> bool:
     return abs(a - b) <= tolerance * max(abs(a), abs(b))
-
-
-def _join(names: set[str]) -> str:
-    return ", ".join(sorted(names)) or "none"

@@ -33,31 +33,20 @@ KNOWN_PARTS: dict[str, tuple[str | None, str | None]] = {
 }
 #: The effect of the catalogue that stands for each of these errors.
 EFFECT_OF_ERROR = {
-    "slip_bias": "slip-offset",
-    "load_gain": "load-gain",
-    "torque_bias": "torque-offset",
-    "torque_gain": "torque-gain",
-    "sinkage_bias": "sinkage-offset",
+    "slip_bias": "slip-offset", "load_gain": "load-gain", "torque_bias": "torque-offset",
+    "torque_gain": "torque-gain", "sinkage_bias": "sinkage-offset",
     "drawbar_pull_bias": "drawbar-offset",
-}
+}  # fmt: skip
 #: Forms of a noise or bias in a message; a bias may be zero.
 NEEDED = "a number in the column's unit, '2 %' of the reading, or '2 % + 0.05'"
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviation of a sensor, from an absolute and a relative part in quadrature.
+    """Standard deviation of a sensor, from an absolute and a relative part in quadrature."""
 
-    Attributes
-    ----------
-    constant
-        Absolute part, in the unit of the column.
-    share
-        Relative part, as a fraction of the reading.
-    """
-
-    constant: float = 0.0
-    share: float = 0.0
+    constant: float = 0.0  # In the unit of the column
+    share: float = 0.0  # As a fraction of the reading
 
     def std(self, reading: Any) -> Any:
         """Standard deviation (...) at readings (...), in their unit."""
@@ -68,7 +57,10 @@ class Noise:
 
     def as_setting(self) -> Any:
         """As it is written in TOML."""
-        return share_and_constant_as_setting(self.share, self.constant)
+        text = f"{100 * self.share:.15g} %"
+        if self.share and self.constant:
+            return f"{text} + {self.constant!r}"
+        return text if self.share else self.constant
 
 
 @dataclass(frozen=True)
@@ -77,20 +69,38 @@ class NoiseOfReading:
 
     needed: str = NEEDED
 
-    def take(self, settings: Settings, key: str, kind: str) -> Noise:
-        """The two parts; raises `InputError` as `take_share_and_constant` does."""
-        share, constant = take_share_and_constant(settings, key, self.needed)
-        return Noise(constant=constant, share=share)
+    def take(self, settings: Settings, key: str, kind: str = "") -> Noise:
+        """The two parts; raises `InputError` for another form, and for a part that is negative or
+        too large.
+        """
+        value = settings.take(key, (int, float, str), self.needed)
+        match = _SHARE.fullmatch(value) if isinstance(value, str) else None
+        try:
+            share = float(match[1]) / 100.0 if match else 0.0
+            constant = float((match[2] or 0.0) if match else value)
+            if isinstance(value, str) and not match:
+                raise ValueError
+        except ValueError:
+            settings.fail(f"{key} is {value!r}; needed is {self.needed}")
+        if not (math.isfinite(share + constant) and share >= 0.0 and constant >= 0.0):
+            settings.fail(
+                f"{key} is {value!r}; a standard deviation is a finite number, zero or more"
+            )
+        if share > MOST_SHARE or constant > MOST_CONSTANT:
+            settings.fail(
+                f"{key} is {value!r}; a standard deviation is at most {100 * MOST_SHARE:g} % and "
+                f"{MOST_CONSTANT:g}"
+            )
+        return Noise(constant, share)
 
 
 def take_noise(settings: Settings, key: str) -> Noise:
     """Read `key = 0.05`, `key = "2 %"` or `key = "2 % + 0.05"`."""
-    share, constant = take_share_and_constant(settings, key, NEEDED)
-    if share + constant == 0.0:
-        settings.fail(
-            f"{key} is {settings.content[key]!r}; a standard deviation must be above zero"
-        )
-    return Noise(constant=constant, share=share)
+    noise = NoiseOfReading().take(settings, key)
+    if noise == Noise():
+        shown = settings.content[key]
+        settings.fail(f"{key} is {shown!r}; a standard deviation must be above zero")
+    return noise
 
 
 def take_bias(settings: Settings) -> dict[str, Noise]:
@@ -104,8 +114,7 @@ def take_bias(settings: Settings) -> dict[str, Noise]:
     for key, (offset, gain) in KNOWN_PARTS.items():
         if key not in settings:
             continue
-        share, constant = take_share_and_constant(settings, key, NEEDED)
-        bias = Noise(constant=constant, share=share)
+        bias = NoiseOfReading().take(settings, key)
         if bias.share and gain is None:
             settings.fail(f"{key} has a bias in its own unit; needed is a number without %")
         if bias.constant and offset is None:
@@ -140,41 +149,6 @@ def common_errors(bias: Mapping[str, Noise]) -> dict[str, float]:
         errors |= {offset: declared.constant} if offset else {}
         errors |= {gain: declared.share} if gain else {}
     return errors
-
-
-def take_share_and_constant(settings: Settings, key: str, needed: str) -> tuple[float, float]:
-    """Share, as a fraction, and constant part of `key = 0.05`, `"2 %"` or `"2 % + 0.05"`.
-
-    Raises `InputError` for another form and for a part that is negative or too large; `needed`
-    describes the three forms in its message.
-    """
-    value = settings.take(key, (int, float, str), needed)
-    share = constant = math.nan
-    try:
-        if not isinstance(value, str):
-            share, constant = 0.0, float(value)
-        elif match := _SHARE.fullmatch(value):
-            share, constant = float(match[1]) / 100.0, float(match[2] or 0.0)
-        else:
-            settings.fail(f"{key} is {value!r}; needed is {needed}")
-    except ValueError:
-        settings.fail(f"{key} is {value!r}; needed is {needed}")
-    if not (math.isfinite(share + constant) and share >= 0.0 and constant >= 0.0):
-        settings.fail(f"{key} is {value!r}; a standard deviation is a finite number, zero or more")
-    if share > MOST_SHARE or constant > MOST_CONSTANT:
-        settings.fail(
-            f"{key} is {value!r}; a standard deviation is at most {100 * MOST_SHARE:g} % and "
-            f"{MOST_CONSTANT:g}"
-        )
-    return share, constant
-
-
-def share_and_constant_as_setting(share: float, constant: float) -> Any:
-    """The two parts as they are written in TOML."""
-    text = f"{100 * share:.15g} %"
-    if share and constant:
-        return f"{text} + {constant!r}"
-    return text if share else constant
 
 
 #: Correlation lengths in slip and in the logarithm of the load, where none is given: errors of a
@@ -217,7 +191,7 @@ class Discrepancy:
 
     def as_setting(self) -> Any:
         """The amplitude as it is written in TOML."""
-        return share_and_constant_as_setting(self.share, self.constant)
+        return Noise(self.constant, self.share).as_setting()
 
 
 def range_with_zero(readings: NDArray[np.float64]) -> float:
@@ -235,9 +209,11 @@ def range_with_zero(readings: NDArray[np.float64]) -> float:
 def take_discrepancy(settings: Settings) -> dict[str, Discrepancy]:
     """Read the table [discrepancy]: an amplitude by column, and lengths that all columns share."""
     keys = [column(name) for name in CHANNELS]
-    needed = "a number in the column's unit, '2 %' of the readings' range, or '2 % + 0.1'"
+    form = NoiseOfReading(
+        "a number in the column's unit, '2 %' of the readings' range, or '2 % + 0.1'"
+    )
     settings.permit(keys)
-    parts = {k: take_share_and_constant(settings, k, needed) for k in keys if k in settings}
+    parts = {k: form.take(settings, k) for k in keys if k in settings}
     common = Discrepancy(
         slip_length=_take_length(settings, "slip_length", SLIP_LENGTH),
         log_load_length=_take_length(settings, "log_load_length", LOG_LOAD_LENGTH),
@@ -246,7 +222,7 @@ def take_discrepancy(settings: Settings) -> dict[str, Discrepancy]:
     settings.finish()
     if settings.content and not parts:
         settings.fail(f"no channel has a discrepancy; give torque_Nm = '2 %', or {keys[1]}, ...")
-    return {key: replace(common, share=s, constant=c) for key, (s, c) in parts.items()}
+    return {k: replace(common, share=n.share, constant=n.constant) for k, n in parts.items()}
 
 
 def discrepancy_as_settings(discrepancy: dict[str, Discrepancy]) -> dict[str, Any]:

@@ -7,15 +7,17 @@ channel and gear, given the readings of the analysis.
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.io.declared_settings import Default, Numbers, OneOf, take_declared
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
 from soilml.numerics.smooth_process import SmoothFunctions, process_columns, squared_exponential
@@ -38,7 +40,29 @@ MOST_MARKS, MARK_DIGITS = 32, 8
 #: Correlation lengths outside the range within which what was learned fades. Of 0.25, 0.5, 1 and
 #: infinitely many, the longer the better under heavier loads; one that ends is nevertheless needed.
 FADING_LENGTH = 2.0
-KEYS = ("column", "gear", "amplitude", "usual", "slip_length", "log_load_length", "slip", "load")
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """A list of finite numbers (depth 1), or of such lists (depth 2)."""
+
+    depth: int
+
+    def take(self, settings: Settings, key: str, kind: str) -> tuple[Any, ...]:
+        """The numbers as tuples."""
+        needed = f"a list of {'lists of ' if self.depth > 1 else ''}finite numbers"
+        value = settings.take(key, list, needed)
+        rows = value if self.depth > 1 else [value]
+        flat: list[Any] = [v for row in rows for v in (row if isinstance(row, list) else [None])]
+        if not all(type(v) in (int, float) and math.isfinite(v) for v in flat):
+            settings.fail(f"{key} must be {needed}")
+        found = tuple(tuple(float(v) for v in row) for row in rows)
+        return found if self.depth > 1 else found[0]
+
+
+_LENGTHS = ("slip_length", "log_load_length")
+_RANGE = Numbers("[smallest, largest]", 2, ordered=True)
+_CHANNEL = OneOf(tuple(map(column, CHANNELS)))
 
 
 @dataclass(frozen=True)
@@ -65,42 +89,24 @@ class RemainderPart:
     References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. 2.25 and
     2.26; Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2. Valid for smooth
     errors of slip and load alone: what changes with time, speed or pass is not in it.
-
-    Attributes
-    ----------
-    column, gear
-        Column of the channel, and name of the gear; "" where the model has one gear.
-    amplitude, usual
-        Standard deviation a of the process, and that of a model's usual error, in the column's
-        unit.
-    slip_length, log_load_length
-        Correlation lengths in slip and in the natural logarithm of the load.
-    slip, load
-        Smallest and largest slip, and load (N), of the analysis.
-    points
-        Slip and load (N) of each of k points, (k, 2).
-    mean
-        Mean of the weights, (k,).
-    known
-        F, (k, r): what the readings told of the weights, given soil and effects.
-    shared
-        G, (k, p): shifts of the weights with soil and effects, by one standard deviation of p
-        independent combinations of them. Where these are fitted anew, the covariance of the weights
-        is I - F F^T + G G^T.
     """
 
-    column: str
-    gear: str
-    amplitude: float
-    usual: float
-    slip_length: float
+    column: Annotated[str, _CHANNEL]
+    gear: Annotated[str, Default("")]  # "" where the model has one gear
+    amplitude: float  # Standard deviation a of the process, in the column's unit
+    usual: float  # That of a model's usual error
+    slip_length: float  # Correlation lengths in slip and in the natural logarithm of the load
     log_load_length: float
-    slip: tuple[float, float]
-    load: tuple[float, float]
-    points: tuple[tuple[float, ...], ...]
-    mean: tuple[float, ...]
-    known: tuple[tuple[float, ...], ...]
-    shared: tuple[tuple[float, ...], ...]
+    slip: Annotated[tuple[float, float], _RANGE]  # Range of the analysis
+    load: Annotated[tuple[float, float], _RANGE]  # N
+    points: Annotated[tuple[tuple[float, ...], ...], _Rows(2)]  # Slip and load (N), (k, 2)
+    mean: Annotated[tuple[float, ...], _Rows(1)]  # Of the weights, (k,)
+    # F, (k, r): what the readings told of the weights, given soil and effects
+    known: Annotated[tuple[tuple[float, ...], ...], _Rows(2)]
+    # G, (k, p): shifts of the weights with soil and effects, by one standard deviation of p
+    # independent combinations of them. Where these are fitted anew, the covariance of the weights
+    # is I - F F^T + G G^T
+    shared: Annotated[tuple[tuple[float, ...], ...], _Rows(2)]
 
     def scaled(self, slip: Floats, load: Floats) -> Floats:
         """Slips and loads (n,) as points (n, 2) over the correlation lengths."""
@@ -298,56 +304,29 @@ def take_remainder(settings: Settings, gears: Iterable[str]) -> Remainder:
 
 
 def _take_part(settings: Settings, gears: Sequence[str]) -> RemainderPart:
-    known = [column(name) for name in CHANNELS]
-    name, gear = settings.text("column"), settings.text("gear", "")
-    if name not in known:
-        settings.fail(f"column is {name!r}; a remainder has one of: {', '.join(known)}")
-    if gear not in (gears or ("",)):
+    part = take_declared(RemainderPart, settings)
+    if part.gear not in (gears or ("",)):
         of = f"there are: {', '.join(gears)}" if gears else "this file has one, without a name"
-        settings.fail(f"gear is {gear!r}; {of}")
-    numbers = {key: settings.number(key) for key in KEYS[2:6]}
-    for key, value in numbers.items():
+        settings.fail(f"gear is {part.gear!r}; {of}")
+    sizes = {key: getattr(part, key) for key in ("amplitude", "usual", *_LENGTHS)}
+    for key, value in (*sizes.items(), ("load", part.load[0])):
         if not (math.isfinite(value) and value > 0.0):
             settings.fail(f"{key} is {value:g}; needed is a finite number above zero")
-    ranges = {key: tuple(_rows(settings, key, 1)[0]) for key in ("slip", "load")}
-    for key, ends in ranges.items():
-        if len(ends) != 2 or ends[0] > ends[1] or (key == "load" and ends[0] <= 0.0):
-            settings.fail(f"{key} must be [smallest, largest]")
-    points = _rows(settings, "points", 2)
-    count = len(points)
-    if not 1 <= count <= MOST_POINTS or any(len(p) != 2 or p[1] <= 0.0 for p in points):
+    count = len(part.points)
+    if not 1 <= count <= MOST_POINTS or any(len(p) != 2 or p[1] <= 0.0 for p in part.points):
         settings.fail(f"points must be 1 to {MOST_POINTS} pairs [slip, load_N]")
-    (mean,) = _rows(settings, "mean", 1)
-    factors = {key: _rows(settings, key, 2) for key in ("known", "shared")}
-    for key, rows in {"mean": mean, **factors}.items():
+    for key in ("mean", "known", "shared"):
+        rows: tuple[Any, ...] = getattr(part, key)
         if len(rows) != count:
             settings.fail(f"{key} has {len(rows)} rows; needed is one for each of {count} points")
-    for key, rows in factors.items():
-        if len({len(row) for row in rows}) > 1:
+        if key != "mean" and len({len(row) for row in rows}) > 1:
             settings.fail(f"the rows of {key} differ in length")
-    settings.finish()
-    part = RemainderPart(name, gear, **numbers, **ranges, points=points, mean=mean, **factors)  # type: ignore[arg-type]
     if part._matrix("known").size and np.linalg.norm(part._matrix("known"), 2) > 1.0 + TOLERANCE:
         settings.fail("known is larger than 1: the variance would be negative")
-    z = part.scaled(*np.asarray(points).T)
+    z = part.scaled(*np.asarray(part.points).T)
     if np.linalg.eigvalsh(squared_exponential(z, z))[0] < LEAST_PIVOT:
         settings.fail("points contains points that are too near each other")
     return part
-
-
-def _rows(settings: Settings, key: str, depth: int) -> tuple[Any, ...]:
-    """A list of finite numbers (depth 1, as its only row), or of such lists."""
-    needed = "a list of finite numbers" if depth == 1 else "a list of lists of finite numbers"
-    value = settings.take(key, list, needed)
-    rows = [value] if depth == 1 else value
-    for row in rows:
-        if not isinstance(row, list) or not all(_is_finite(v) for v in row):
-            settings.fail(f"{key} must be {needed}")
-    return tuple(tuple(float(v) for v in row) for row in rows)
-
-
-def _is_finite(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def remainder_lines(remainder: Remainder) -> list[str]:
@@ -371,7 +350,7 @@ def _marks(table: Table) -> set[str]:
 
 def _written(value: Any) -> str:
     if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+        return json.dumps(value, ensure_ascii=False)
     if isinstance(value, tuple):
         inner = ", ".join(_written(v) for v in value)
         return f"[{inner}]"

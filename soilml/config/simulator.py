@@ -33,41 +33,22 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class Simulator:
-    """The table [simulator] of a model file, and the error of the emulator of its runs.
+    """The table [simulator] of a model file, and the error of the emulator of its runs."""
 
-    Attributes
-    ----------
-    runs
-        File of the runs; None where the model file has them within it.
-    python, function
-        The Python file and its function that make runs; None and "" where none does.
-    command
-        The command with {design} and {runs} that makes runs; "" for none. Neither is run by what
-        reads a file.
-    slip, load
-        Ranges of the design, load in N.
-    folder
-        Folder in which the command is run, that of the model file.
-    gear
-        The gear of the model file.
-    error
-        Standard deviation of the emulator by column, in its unit; empty where no runs were read.
-    states_discrepancy
-        Whether the model file states a [discrepancy] of its own.
-    runs_read
-        The runs: those of the file, or of the key `runs`, by which a recipe has them within it.
-    """
-
-    runs: Path | None
+    runs: Path | None  # File of the runs; None where the model file has them within it
+    # The Python file and its function that make runs, None and "" where none does; or the command
+    # with {design} and {runs} that makes them. Neither is run by what reads a file
     python: Path | None
     function: str
     command: str
-    slip: tuple[float, float]
-    load: tuple[float, float]
-    folder: Path | None
-    gear: Gear
+    slip: tuple[float, float]  # Ranges of the design
+    load: tuple[float, float]  # N
+    folder: Path | None  # In which the command is run: that of the model file
+    gear: Gear  # Of the model file
+    # Standard deviation of the emulator by column, in its unit; empty where no runs were read
     error: dict[str, float] = field(default_factory=dict)
-    states_discrepancy: bool = False
+    states_discrepancy: bool = False  # Whether the model file states one of its own
+    # The runs: those of the file, or of the key `runs`, by which a recipe has them within it
     runs_read: Table | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -185,7 +166,7 @@ def emulator_of(
 ) -> tuple[EmulatedGear, GaussianEmulator]:
     """The gear of a table of runs, and its emulator; raises `InputError` as `design_of` does."""
     found, outputs = design_of(table, gear, prior)
-    emulator = fit_emulator(found.fractions(_inputs(table, found)), outputs)
+    emulator = fit_emulator(found.fractions(_columns(table, found.inputs)), outputs)
     return replace(found, emulate=emulator.__call__), emulator
 
 
@@ -195,7 +176,8 @@ def design_of(table: Table, gear: Gear, prior: Mapping[str, Prior]) -> tuple[Emu
     Raises `InputError` where the runs are too few, lack an output, or contradict each other.
     """
     source = table.source
-    channels = tuple(name for name in CHANNELS if _measured(table, name))
+    columns = {name: table[column(name)] for name in CHANNELS if column(name) in table}
+    channels = tuple(name for name, values in columns.items() if np.isfinite(values).any())
     if not channels:
         raise InputError(f"{source}: no run has {', '.join(map(column, CHANNELS))}: simulate them")
     names = ["slip", "load", *declared(Soil)]
@@ -238,16 +220,8 @@ def _no_emulator(u: Floats) -> Floats:
     raise NotImplementedError("the runs have not been emulated")
 
 
-def _measured(table: Table, name: str) -> bool:
-    return column(name) in table and bool(np.isfinite(table[column(name)]).any())
-
-
 def _columns(table: Table, names: Sequence[str]) -> Floats:
     return np.stack([table[column(name)] for name in names], axis=1)
-
-
-def _inputs(table: Table, gear: EmulatedGear) -> Floats:
-    return _columns(table, gear.inputs)
 
 
 def _check_repeats(table: Table, x: Floats, outputs: Floats) -> None:

@@ -106,9 +106,10 @@ class WheeledRover:
             middle = 0.5 * (low + high)
             try:
                 self.loads(middle)
-                low = middle
             except InputError:
                 high = middle
+            else:
+                low = middle
         return low
 
     def pass_numbers(self, width: Mapping[str, float]) -> dict[str, int]:
@@ -243,11 +244,3 @@ class DriveErrors:
 
 #: Key of each field of `DriveErrors` in the file.
 DRIVE_KEYS = keys_of(DriveErrors)
-
-
-def take_drive(settings: Settings) -> DriveErrors:
-    """Read `[drive]`; every key may be left out.
-
-    Raises `InputError` for an unknown key or a value out of bounds.
-    """
-    return take_declared(DriveErrors, settings)

@@ -43,7 +43,8 @@ class Swap:
         token = os.urandom(4).hex()
         self.targets, self.remove = list(targets), list(remove)
         self.parts = [t.parent / f".{t.name[:40]}.{token}.part" for t in self.targets]
-        self._journal = _journal_name(self.targets[0], token)
+        first = self.targets[0]
+        self._journal = first.parent / f".{first.name[:40]}.{token}.journal"
         self._opened: IO[str] | None = None
 
     def __enter__(self) -> Swap:
@@ -108,7 +109,8 @@ def finish_interrupted(targets: Sequence[Path]) -> None:
     if fcntl is None:
         return
     for target in targets:
-        for journal in target.parent.glob(_journal_pattern(target)):
+        pattern = f".{glob.escape(target.name[:40])}.{'[0-9a-f]' * 8}.journal"
+        for journal in target.parent.glob(pattern):
             if journal not in _own:
                 with suppress(OSError, ValueError, KeyError, TypeError):
                     _finish(journal, {target.parent for target in targets})
@@ -143,14 +145,6 @@ def _exchange(moves: Sequence[tuple[Path, Path]], remove: Sequence[Path]) -> Non
         part.replace(target)
     for path in remove:
         path.unlink(missing_ok=True)
-
-
-def _journal_name(target: Path, token: str) -> Path:
-    return target.parent / f".{target.name[:40]}.{token}.journal"
-
-
-def _journal_pattern(target: Path) -> str:
-    return f".{glob.escape(target.name[:40])}.{'[0-9a-f]' * 8}.journal"
 
 
 @contextmanager

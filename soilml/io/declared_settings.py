@@ -96,6 +96,13 @@ class For:
 
 
 @dataclass(frozen=True)
+class Default:
+    """The value of a field that has none of its own, where the key is absent."""
+
+    value: Any
+
+
+@dataclass(frozen=True)
 class OneOf:
     """A text that is one of some."""
 
@@ -141,6 +148,7 @@ class Numbers:
     lower: float = -math.inf
     upper: float = math.inf
     rising: bool = False
+    ordered: bool = False  # Rising, or equal
     also: tuple[str, ...] = ()
 
     def take(self, settings: Settings, key: str, kind: str) -> Any:
@@ -152,7 +160,8 @@ class Numbers:
         right = isinstance(given, list) and len(numbers) == len(given) == self.count
         if not right or not all(math.isfinite(x) and self.lower <= x <= self.upper for x in given):
             settings.fail(f"{key} is {given!r}; needed is {self.needed}")
-        if self.rising and not given[0] < given[1]:
+        wrong = (self.rising and given[0] >= given[1]) or (self.ordered and given[0] > given[1])
+        if wrong:
             settings.fail(f"{key} is {given!r}; needed is {self.needed}, the lower one first")
         return tuple(float(x) for x in given)
 
@@ -191,7 +200,10 @@ def take_declared(cls: type[T], settings: Settings, kind: str = "", **given: Any
         wanted = [mark.kinds for mark in marks if isinstance(mark, For)]
         if name in given or any(kind not in kinds for kinds in wanted):
             continue
-        if key in settings or needed:
+        default = next((mark for mark in marks if isinstance(mark, Default)), None)
+        if default is not None and key not in settings:
+            values[name] = default.value
+        elif key in settings or needed:
             values[name] = _taken(settings, key, hint, marks, kind)
         settings.permit([key])
     settings.finish()

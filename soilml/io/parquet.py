@@ -21,34 +21,26 @@ def read_parquet(path: Path, most: Bound = TABLE_VALUES) -> tuple[dict[str, Any]
     """Arrow columns by name, and the file's metadata; page checksums are verified if present.
 
     Columns of text are dictionaries: a value that repeats stands once in memory. `most` bounds the
-    values of all columns. The path is a file, or a folder whose Parquet files are one table, in the
-    order of their names.
+    values of all columns.
 
-    Raises `OSError` where it is missing, `TableError` where a file is damaged, has a column twice
-    or more than a bound of `soilml.io.bounds`, or where a folder has no file, files of different
-    tables, or fewer rows than it should.
+    Raises `OSError` where it is missing, `TableError` where it is damaged, has a column twice or
+    more than a bound of `soilml.io.bounds`.
     """
     need("pyarrow", "", what=f"{path}: reading Parquet")
     import pyarrow as pa
 
-    files = sorted(path.glob("*.parquet")) if path.is_dir() else [path]
-    if not files:
-        raise TableError(f"{path} is a folder without a Parquet file")
-    _check_sizes(path, files, most)
-    tables = [_read_file(file) for file in files]
-    first = _metadata(tables[0])
-    for file, table in zip(files, tables, strict=True):
-        if not table.schema.equals(tables[0].schema) or _metadata(table) != first:
-            raise TableError(f"{file} and {files[0]} are not of one table; read one of them")
-    _check_recipe(path, first)
-    arrow = pa.concat_tables(tables)
-    rows = first.get("soilml_rows", "")
-    if path.is_dir() and rows.isdecimal() and int(rows) != len(arrow):
-        raise TableError(
-            f"{path} has {len(arrow)} of {rows} rows: `soilml generate` was interrupted; the same "
-            "command completes it"
-        )
-    return dict(zip(arrow.column_names, arrow.columns, strict=True)), first
+    _check_sizes(path, _opened(path, lambda opened: opened.metadata), most)
+    schema = _opened(path, lambda opened: opened.schema_arrow)
+    names = schema.names
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise TableError(f"{path}: column {twice} occurs twice")
+    texts = [name for name in names if pa.types.is_string(schema.field(name).type)]
+    arrow = _opened(path, lambda opened: opened.read(), texts)
+    held = (arrow.schema.metadata or {}).items()
+    metadata = {k.decode(errors="replace"): v.decode(errors="replace") for k, v in held}
+    _check_recipe(path, metadata)
+    return dict(zip(arrow.column_names, arrow.columns, strict=True)), metadata
 
 
 @runtime_checkable
@@ -57,7 +49,6 @@ class ArrowStream(Protocol):
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         """A capsule with an ArrowArrayStream."""
-        ...
 
 
 def arrow_columns(frame: ArrowStream) -> dict[str, Any]:
@@ -71,26 +62,20 @@ def arrow_columns(frame: ArrowStream) -> dict[str, Any]:
     return dict(zip(arrow.column_names, arrow.columns, strict=True))
 
 
-def _check_sizes(path: Path, files: Sequence[Path], most: Bound) -> None:
-    """Raise `TableError` for more than may be read, as the ends of the files state it.
+def _check_sizes(path: Path, found: Any, most: Bound) -> None:
+    """Raise `TableError` for more than may be read, as the end of the file states it.
 
     A column that repeats one value takes hardly any room in a file, and all of it in memory.
     """
-    rows = values = texts = 0
-    for file in files:
-        found = _opened(file, lambda opened: opened.metadata)
-        rows += int(found.num_rows)
-        COLUMNS.check(file, int(found.num_columns))
-        ROWS.check(path, rows)
-        most.check(path, rows * int(found.num_columns))
-        for i in range(found.num_row_groups):
-            group = found.row_group(i)
-            for part in map(group.column, range(group.num_columns)):
-                values += int(part.num_values)  # of lists, more than rows
-                is_text = part.physical_type in ("BYTE_ARRAY", "FIXED_LEN_BYTE_ARRAY")
-                texts += int(part.total_uncompressed_size) * is_text
-        most.check(path, values)
-        TEXT_BYTES.check(path, texts)
+    COLUMNS.check(path, int(found.num_columns))
+    ROWS.check(path, int(found.num_rows))
+    most.check(path, int(found.num_rows) * int(found.num_columns))
+    groups = [found.row_group(i) for i in range(found.num_row_groups)]
+    parts = [group.column(i) for group in groups for i in range(group.num_columns)]
+    most.check(path, sum(int(part.num_values) for part in parts))  # of lists, more than rows
+    kinds = ("BYTE_ARRAY", "FIXED_LEN_BYTE_ARRAY")
+    texts = [int(p.total_uncompressed_size) for p in parts if p.physical_type in kinds]
+    TEXT_BYTES.check(path, sum(texts))
 
 
 def _opened(file: Path, read: Callable[[Any], Any], texts: Sequence[str] = ()) -> Any:
@@ -112,41 +97,14 @@ def _opened(file: Path, read: Callable[[Any], Any], texts: Sequence[str] = ()) -
             raise TableError(f"{file} is not a complete Parquet file: {first}") from None
 
 
-def _read_file(file: Path) -> Any:
-    """The content of one file as an Arrow table."""
-    import pyarrow as pa
-
-    schema = _opened(file, lambda opened: opened.schema_arrow)
-    names = schema.names
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise TableError(f"{file}: column {twice} occurs twice")
-    texts = [name for name in names if pa.types.is_string(schema.field(name).type)]
-    return _opened(file, lambda opened: opened.read(), texts)
-
-
-def _metadata(table: Any) -> dict[str, str]:
-    """Metadata of a table, without what tells the files of a folder apart."""
-    return {
-        key.decode(errors="replace"): value.decode(errors="replace")
-        for key, value in (table.schema.metadata or {}).items()
-        if key != b"soilml_part"
-    }
-
-
 def _check_recipe(path: Path, metadata: dict[str, str]) -> None:
     """Raise `TableError` where the recipe in the metadata is not the one that was written."""
-    recipe = metadata.get("soilml_recipe")
-    if recipe is None:
-        if "soilml_recipe_sha256" in metadata:
-            raise TableError(
-                f"{path}: its metadata have the checksum of a recipe and no recipe; generate it "
-                "again"
-            )
-    elif hashlib.sha256(recipe.encode()).hexdigest() != metadata.get("soilml_recipe_sha256"):
-        raise TableError(
-            f"{path}: the recipe in its metadata does not match its checksum; generate it again"
-        )
+    recipe, stated = metadata.get("soilml_recipe"), metadata.get("soilml_recipe_sha256")
+    fault = "has the checksum of a recipe and no recipe" if stated and recipe is None else ""
+    if recipe is not None and hashlib.sha256(recipe.encode()).hexdigest() != stated:
+        fault = "has a recipe that does not match its checksum"
+    if fault:
+        raise TableError(f"{path}: its metadata {fault}; generate it again")
 
 
 def own_columns(metadata: Mapping[str, str]) -> list[str]:
@@ -167,7 +125,7 @@ def plain_column(file: Path, name: str, column: Any) -> Column:
 
     kind = column.type.value_type if pa.types.is_dictionary(column.type) else column.type
     number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)
-    text = any(f(kind) for f in (pa.types.is_string, pa.types.is_large_string, _is_string_view))
+    text = any(f(kind) for f in (pa.types.is_string, pa.types.is_large_string, _is_view))
     if name not in TEXT:
         if not number:
             raise TableError(f"{file}, column {name}: has type {kind}; needed are numbers")
@@ -190,24 +148,18 @@ def distinct_cells(column: Any) -> tuple[list[Any], Any]:
     """The values of an Arrow column, each once, and the index of that of each row (rows,)."""
     import pyarrow as pa
 
-    if _is_string_view(column.type):  # of polars
+    if _is_view(column.type):  # of polars
         column = column.cast(pa.string())
     if not pa.types.is_dictionary(column.type):
         column = column.dictionary_encode()
-    cells: dict[Any, int] = {}
-    codes = [np.zeros(0, np.int64)]
-    for chunk in column.chunks:
-        own = np.asarray(chunk.indices.fill_null(-1).to_numpy(zero_copy_only=False), np.int64)
-        place = np.zeros(len(chunk.dictionary) + 1, np.int64)  # a blank cell is the last
-        used = np.unique(own)
-        found = chunk.dictionary.take(pa.array(used[used >= 0])).to_pylist()
-        for i, cell in zip(used, [*[None] * int((used < 0).sum()), *found], strict=True):
-            place[i] = cells.setdefault(cell, len(cells))
-        codes.append(place[own])
-    return list(cells), np.concatenate(codes)
+    whole = pa.chunked_array(column).unify_dictionaries().combine_chunks()
+    code = np.asarray(whole.indices.fill_null(-1).to_numpy(zero_copy_only=False), np.int64)
+    used, place = np.unique(code, return_inverse=True)
+    cells = whole.dictionary.take(pa.array(used[used >= 0])).to_pylist()
+    return [*[None] * int((used < 0).sum()), *cells], place
 
 
-def _is_string_view(kind: Any) -> bool:
+def _is_view(kind: Any) -> bool:
     import pyarrow as pa
 
     return bool(pa.types.is_string_view(kind))

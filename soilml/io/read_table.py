@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -83,9 +84,8 @@ def read_table(
     Parameters
     ----------
     path
-        A Parquet file where the name ends in `.parquet`, a folder of Parquet files that `soilml
-        generate` wrote, a spreadsheet (.xlsx, or BOOK.xlsx#SHEET where it has several sheets),
-        otherwise a CSV file with a header and comma as separator. Column names carry their units,
+        A Parquet file where the name ends in `.parquet`, a spreadsheet (.xlsx, or BOOK.xlsx#SHEET
+        where it has several sheets), otherwise a CSV file with a header and comma as separator. Column names carry their units,
         such as load_N and torque_Nm. Data frames of pandas, polars and pyarrow, and whatever else
         exports an Arrow stream, are read with the same checks; `Table.to_arrow` gives one back.
     need
@@ -128,17 +128,24 @@ def read_table(
     """
     if isinstance(path, ArrowStream):
         file = Path("data frame")
-        columns = arrow_columns(path)
-        kept = known_columns(file, list(columns), ignore_extra)
-        table = Table({name: plain_column(file, name, columns[name]) for name in kept}, str(file))
+        table = _of_arrow(file, arrow_columns(path), ignore_extra)
         return check_table(table, file, need, filled, limits)
-    file = Path(path)
+    file, hint = Path(path), f"{', '.join(RUNS)}, ..."
+
+    def kept(header: list[str]) -> list[str]:
+        return known_columns(file, header, ignore_extra)
+
     try:
         refuse_device(split_sheet(file)[0])
-        if file.suffix == ".parquet" or file.is_dir():
-            table = _read_parquet(file, ignore_extra)
+        if file.suffix == ".parquet":
+            found, metadata = read_parquet(file)
+            table = _of_arrow(file, found, ignore_extra, metadata)
+        elif is_spreadsheet(file):
+            columns, lines = read_sheet(file, kept, hint)
+            table = Table(columns, str(file), lines)
         else:
-            table = _read_csv(file, ignore_extra, progress)
+            columns, lines = read_csv(file, kept, hint, progress)
+            table = Table(columns, str(file), lines)
     except FileNotFoundError:
         raise TableError(f"{file}: there is no such file") from None
     except OSError as error:
@@ -164,7 +171,11 @@ def check_table(
         table = replace(table, columns={**table.columns, **unmeasured})
     for name in need:
         if name not in table:
-            raise TableError(f"{file}: column {name} is missing;{_instead(name, table)}")
+            hint = {
+                "torque_Nm": "needed is a torque, a drawbar_pull_N or a sinkage_m",
+                "run": "add it, with one name for all rows that were measured together",
+            }.get(name, f"found: {', '.join(table.columns) or 'no column'}")
+            raise TableError(f"{file}: column {name} is missing; {hint}")
     if len(table) == 0:
         raise TableError(f"{file}: the table has a header but no row")
     _check_values(table, filled, _LIMITS | dict(limits or {}))
@@ -174,19 +185,14 @@ def check_table(
     return table
 
 
-def _read_csv(
-    file: Path, ignore_extra: bool, progress: Callable[[int], None] | None = None
+def _of_arrow(
+    file: Path, found: Mapping[str, Any], ignore_extra: bool, metadata: dict[str, str] | None = None
 ) -> Table:
-    hint = f"{', '.join(RUNS)}, ..."
-    if is_spreadsheet(file):
-        columns, lines = read_sheet(
-            file, lambda header: known_columns(file, header, ignore_extra), hint
-        )
-        return Table(columns, str(file), lines)
-    columns, lines = read_csv(
-        file, lambda header: known_columns(file, header, ignore_extra), hint, progress
-    )
-    return Table(columns, str(file), lines)
+    """The table of Arrow columns, of a file where there is metadata."""
+    kept = known_columns(file, list(found), ignore_extra, own_columns(metadata or {}))
+    columns = {name: plain_column(file, name, found[name]) for name in kept}
+    rows = 0 if metadata is None or not found else len(next(iter(found.values())))
+    return Table(columns, str(file), np.arange(1, rows + 1), metadata or {})
 
 
 def known_columns(
@@ -204,13 +210,14 @@ def known_columns(
             "or let `soilml import --init` guess what they are"
         )
     for name in header:
+        base = name.removesuffix("_std")
         if header.count(name) > 1:
             raise TableError(f"{file}: column {name} occurs twice")
-        if name in DERIVED and name not in own:
-            continue
-        base = name.removesuffix("_std")
         if name in own or (base in COLUMNS and (base == name or base not in TEXT)):
-            kept.append(name)
+            if name in own or name not in DERIVED:
+                kept.append(name)
+        elif name in DERIVED:
+            continue
         elif hint := _misnamed(name):
             raise TableError(f"{file}: column {name!r}: {hint}")
         elif not ignore_extra:
@@ -269,22 +276,6 @@ def _check_values(table: Table, filled: Sequence[str], limits: Mapping[str, Limi
             )
 
 
-def _instead(name: str, table: Table) -> str:
-    if name == "torque_Nm":
-        return " needed is a torque, a drawbar_pull_N or a sinkage_m"
-    if name == "run":
-        return " add it, with one name for all rows that were measured together"
-    return f" found: {', '.join(table.columns) or 'no column'}"
-
-
-def _read_parquet(file: Path, ignore_extra: bool) -> Table:
-    found, metadata = read_parquet(file)
-    kept = known_columns(file, list(found), ignore_extra, own_columns(metadata))
-    columns = {name: plain_column(file, name, found[name]) for name in kept}
-    rows = len(next(iter(found.values()))) if found else 0
-    return Table(columns, str(file), np.arange(1, rows + 1), metadata)
-
-
 def as_table(rows: Rows) -> Table:
     """The table of rows; data frames, columns and tables made of them are checked as files are.
 
@@ -330,24 +321,19 @@ def _checked(rows: Mapping[str, ArrayLike], source: str, metadata: Mapping[str, 
 
 def _column(source: str, name: str, values: ArrayLike) -> Column:
     """A column (rows,) of text or of numbers; a single value is a column of one row."""
+    where = f"{source}, column {name}"
     try:
         given = np.atleast_1d(np.asarray(values))
     except ValueError:  # lists of different lengths
-        raise TableError(f"{source}, column {name}: needed is one value a row") from None
+        raise TableError(f"{where}: needed is one value a row") from None
     if given.ndim != 1:
-        shape = given.shape
-        raise TableError(f"{source}, column {name}: has shape {shape}; needed is one value a row")
+        raise TableError(f"{where}: has shape {given.shape}; needed is one value a row")
     if name in TEXT:
         return text_column(given.tolist(), lambda i: f"{source}, row {i + 1}, column {name}")
     if given.dtype.kind in "iuf":
         return given.astype(np.float64)
-    cells = given.tolist()
-    if given.dtype.kind != "O" or not all(c is None or _is_number(c) for c in cells):
-        raise TableError(
-            f"{source}, column {name}: needed are numbers, and None where one is missing"
-        )
-    return np.asarray([np.nan if c is None else c for c in cells], dtype=np.float64)
-
-
-def _is_number(cell: object) -> bool:
-    return isinstance(cell, int | float | np.number) and not isinstance(cell, bool)
+    cells = [np.nan if cell is None else cell for cell in given.tolist()]
+    numbers = [isinstance(c, int | float | np.number) and not isinstance(c, bool) for c in cells]
+    if given.dtype.kind != "O" or not all(numbers):
+        raise TableError(f"{where}: needed are numbers, and None where one is missing")
+    return np.asarray(cells, dtype=np.float64)

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 from xml.etree import ElementTree
 
 from soilml.errors import TableError
@@ -115,7 +115,7 @@ def _opened(file: Path) -> Iterator[_Book]:
             parts = _parts(packed)
             _check_size(file, packed, parts.values())
             with CalamineWorkbook.from_path(file) as cells_of:
-                yield _Book(file, packed, cells_of, parts, _percent_styles(packed))
+                yield _Book(file, packed, cells_of, parts)
     except (OSError, TableError):
         raise
     except zipfile.BadZipFile:
@@ -124,7 +124,11 @@ def _opened(file: Path) -> Iterator[_Book]:
             " open it in a spreadsheet program and save it as .xlsx or CSV"
         ) from None
     except Exception as error:  # of many kinds, by the part that is damaged
-        _damaged(file, error)
+        said = " ".join(str(error).split())[:80] or type(error).__name__
+        raise TableError(
+            f"{file} is a damaged spreadsheet ({said}); open it in a spreadsheet program and save "
+            "it anew, or save the sheet as CSV"
+        ) from None
 
 
 def _check_size(file: Path, packed: zipfile.ZipFile, sheets: Iterable[str]) -> None:
@@ -144,14 +148,6 @@ def _check_size(file: Path, packed: zipfile.ZipFile, sheets: Iterable[str]) -> N
         TEXT_BYTES.check(file, longest * len(_SHARED.findall(xml)))
 
 
-def _damaged(file: Path, error: Exception) -> NoReturn:
-    said = " ".join(str(error).split())[:80] or type(error).__name__
-    raise TableError(
-        f"{file} is a damaged spreadsheet ({said}); open it in a spreadsheet program and save it "
-        "anew, or save the sheet as CSV"
-    ) from None
-
-
 def _parts(packed: zipfile.ZipFile) -> dict[str, str]:
     """The sheets that can have cells, and the part of each."""
     relations = ElementTree.fromstring(packed.read("xl/_rels/workbook.xml.rels"))
@@ -164,24 +160,6 @@ def _parts(packed: zipfile.ZipFile) -> dict[str, str]:
     return parts
 
 
-def _percent_styles(packed: zipfile.ZipFile) -> set[bytes]:
-    """The numbers of the styles that show per cent."""
-    if "xl/styles.xml" not in packed.namelist():
-        return set()
-    root = ElementTree.fromstring(packed.read("xl/styles.xml"))
-    shown = {
-        *_PERCENT_FORMATS,
-        *(
-            f.get("numFmtId")
-            for f in root.iterfind(".//{*}numFmt")
-            if "%" in f.get("formatCode", "")
-        ),
-    }
-    styles = root.find("{*}cellXfs")
-    found = enumerate(() if styles is None else styles)
-    return {str(i).encode() for i, style in found if style.get("numFmtId") in shown}
-
-
 @dataclass(frozen=True)
 class _Book:
     """An open spreadsheet, and what calamine does not tell of it."""
@@ -190,7 +168,6 @@ class _Book:
     packed: zipfile.ZipFile
     cells_of: Any  # the workbook as calamine opens it
     parts: dict[str, str]  # of its sheets
-    percent_styles: set[bytes]
 
     def sheet(self, title: str) -> tuple[bytes, Any]:
         """The XML of a sheet, and its cells."""
@@ -201,10 +178,15 @@ class _Book:
 
     def in_percent(self, xml: bytes) -> set[Place]:
         """The cells that are shown in per cent."""
-        if not self.percent_styles:
+        if "xl/styles.xml" not in self.packed.namelist():
             return set()
-        style = rb"""(?=[^>]*\ss=["'](?:%s)["'])""" % b"|".join(self.percent_styles)
-        return {_place(found) for found in re.finditer(_CELL % style, xml)}
+        root = ElementTree.fromstring(self.packed.read("xl/styles.xml"))
+        own = {f.get("numFmtId"): f.get("formatCode", "") for f in root.iterfind(".//{*}numFmt")}
+        shown = {*_PERCENT_FORMATS, *(number for number, code in own.items() if "%" in code)}
+        styles = enumerate(root.iterfind("{*}cellXfs/*"))
+        numbers = "|".join(str(i) for i, style in styles if style.get("numFmtId") in shown)
+        style = rb"""(?=[^>]*\ss=["'](?:%s)["'])""" % numbers.encode()
+        return {_place(found) for found in re.finditer(_CELL % style, xml)} if numbers else set()
 
     def filled(self) -> list[str]:
         """The sheets that have cells."""
@@ -233,16 +215,11 @@ def _listed(sheets: Sequence[str]) -> str:
     return ", ".join(map(repr, sheets[:_SHOWN])) + ", ..." * (len(sheets) > _SHOWN)
 
 
-def _column_number(letters: bytes) -> int:
-    """1 for A, 27 for AA."""
-    number = 0
-    for letter in letters:
-        number = 26 * number + letter - 64
-    return number
-
-
 def _place(found: re.Match[bytes]) -> Place:
-    return int(found[2]) - 1, _column_number(found[1]) - 1
+    column = 0
+    for letter in found[1]:  # 1 for A, 27 for AA
+        column = 26 * column + letter - 64
+    return int(found[2]) - 1, column - 1
 
 
 def _cell_name(place: Place) -> str:
@@ -303,13 +280,11 @@ def _texts(rows: Cells, percents: set[Place]) -> list[list[str]]:
 
 
 def _text(value: Any) -> str:
-    if isinstance(value, str):
-        return " ".join(value.split())  # a tab or a new line would divide the cell
     if isinstance(value, bool):
         return str(int(value))
-    if isinstance(value, datetime.date):
-        return f"{value}" if isinstance(value, datetime.datetime) else f"{value} 00:00:00"
     if isinstance(value, datetime.timedelta):
-        seconds = value.total_seconds()
-        return f"{int(seconds // 3600):02d}:{int(seconds % 3600 // 60):02d}:{seconds % 60:09.6f}"
-    return str(value)
+        minutes, seconds = divmod(value.total_seconds(), 60.0)
+        return f"{int(minutes // 60):02d}:{int(minutes % 60):02d}:{seconds:09.6f}"
+    if isinstance(value, datetime.date) and not isinstance(value, datetime.datetime):
+        return f"{value} 00:00:00"
+    return " ".join(str(value).split())  # a tab or a new line would divide the cell

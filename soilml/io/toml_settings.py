@@ -17,8 +17,10 @@ from soilml.optional_imports import tomllib
 
 #: Tables and lists in one another that a settings file may have; none needs more than six.
 MOST_DEPTH = 20
-#: A part of a key, bare or in quotes, or another character.
-_TOKEN = re.compile(r"""[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*'|.""")
+#: A dotted key of more parts, bare or in quotes: time and memory of the parser grow with the square
+#: of the parts.
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_LONG_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{MOST_DEPTH},}}[ \t]*[\]=]")
 
 
 class Settings:
@@ -124,10 +126,12 @@ def read_settings(
         with file.open(encoding="utf-8-sig") as opened:  # which may be a pipe, of any length
             text = opened.read(SETTINGS.most + 1)
         SETTINGS.check(file, len(text))
-        _check_keys(text, str(file))
+        if _LONG_KEY.search(text):
+            raise InputError(
+                f"{file} is not valid, nested too deep: a key has more than {MOST_DEPTH} parts"
+            )
         content = tomllib.loads(text)
-        _check_depth(content, str(file))
-        _check_whole_numbers(content, str(file))
+        _check_values(content, str(file))
     except FileNotFoundError:
         hint = f"; `{write}` writes one" if write else ""
         raise InputError(f"{file}: there is no such file{hint}") from None
@@ -146,51 +150,17 @@ def read_settings(
     return Settings(content, str(file), files or NamedFiles(file.parent))
 
 
-def _check_keys(text: str, where: str) -> None:
-    """Raise `InputError` for a dotted key of more than `MOST_DEPTH` parts.
-
-    Before the text is parsed: time and memory of the parser grow with the square of the parts.
+def _check_values(content: Any, where: str, depth: int = 0) -> None:
+    """Raise `InputError` for tables or lists in more than `MOST_DEPTH` others, and for a whole
+    number of more than the 64 bits that TOML allows.
     """
-    for line in text.splitlines():
-        if line.count(".") < MOST_DEPTH:
-            continue
-        parts, after_dot = 0, False
-        for token in _TOKEN.findall(line):
-            if token in (" ", "\t"):
-                continue
-            if token in ("=", "]") and parts > MOST_DEPTH:
-                raise InputError(
-                    f"{where} is not valid, nested too deep: a key has more than {MOST_DEPTH} parts"
-                )
-            if token == ".":
-                after_dot = parts > 0
-                continue
-            is_part = len(token) > 1 or token.isalnum() or token in "-_"
-            parts = (parts + 1 if after_dot else 1) if is_part else 0
-            after_dot = False
-
-
-def _check_depth(content: Any, where: str) -> None:
-    """Raise `InputError` for tables or lists in more than `MOST_DEPTH` others."""
-    level = [content]
-    for _ in range(MOST_DEPTH):
-        level = [
-            inner
-            for value in level
-            if isinstance(value, dict | list)
-            for inner in (value.values() if isinstance(value, dict) else value)
-        ]
-    if level:
+    if depth > MOST_DEPTH:
         raise InputError(f"{where} is not valid: tables or lists are nested too deep")
-
-
-def _check_whole_numbers(content: Any, where: str) -> None:
-    """Raise `InputError` for a whole number of more than the 64 bits that TOML allows."""
     if isinstance(content, dict):
         for name, value in content.items():
-            _check_whole_numbers(value, f"{where} {name}")
+            _check_values(value, f"{where} {name}" if depth < 2 else where, depth + 1)
     elif isinstance(content, list):
         for value in content:
-            _check_whole_numbers(value, where)
+            _check_values(value, where, depth + 1)
     elif isinstance(content, int) and not -(2**63) <= content < 2**63:
         raise InputError(f"{where}: the whole number has more than the 64 bits of TOML")

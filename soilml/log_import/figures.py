@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +36,6 @@ _MOST_POINTS = 700
 _WINDOW, _LEFT_OUT = AFTER, PRIOR
 
 
-def rows_of_panels(table: Table, radius: float) -> int:
-    """How many panels `plot_rows` draws."""
-    return len(panels_over_slip(table, radius))
-
-
 def plot_rows(table: Table, radius: float, ax: Any = None) -> NDArray[Any]:
     """Draw the rows over slip, a panel for each channel that was measured; see `take_axes`."""
     shown = panels_over_slip(table, radius)
@@ -60,32 +56,28 @@ class PanelOverSlip:
 
 def panels_over_slip(table: Table, radius: float) -> list[PanelOverSlip]:
     """T / (W r), or torque where the radius (m) is NaN; drawbar pull over load; sinkage."""
-    load, found = table["load_N"], []
-    if np.isfinite(table["torque_Nm"]).any():
-        if np.isfinite(radius):
-            found.append(PanelOverSlip("torque_Nm", load * radius, "torque / (load × radius)"))
-        else:
-            found.append(PanelOverSlip("torque_Nm", np.ones(len(table)), "torque, N m"))
-    if "drawbar_pull_N" in table:
-        found.append(PanelOverSlip("drawbar_pull_N", load, "drawbar pull / load"))
-    if "sinkage_m" in table:
-        found.append(PanelOverSlip("sinkage_m", np.full(len(table), 1e-3), "sinkage, mm"))
-    return found
+    load, one = table["load_N"], np.ones(len(table))
+    torque = (load * radius, "torque / (load × radius)")
+    known = {
+        "torque_Nm": torque if np.isfinite(radius) else (one, "torque, N m"),
+        "drawbar_pull_N": (load, "drawbar pull / load"),
+        "sinkage_m": (1e-3 * one, "sinkage, mm"),
+    }
+    return [PanelOverSlip(key, *shown) for key, shown in known.items()
+            if key in table and np.isfinite(table[key]).any()]  # fmt: skip
 
 
 def draw_over_slip(axes: Axes, table: Table, panel: PanelOverSlip) -> None:
     """Draw a column over slip with 90 % intervals, in a colour for each load."""
-    key, unit = panel.key, panel.unit
-    loads = table["load_N"]
-    groups = load_groups(loads)
-    std = table[f"{key}_std"] if f"{key}_std" in table else np.zeros(len(table))
-    slip_std = table["slip_std"] if "slip_std" in table else np.zeros(len(table))
+    key, unit, loads = panel.key, panel.unit, table["load_N"]
+    groups = _load_groups(loads)
+    std, slip_std = _std(table, key), _std(table, "slip")
     for k in range(int(groups.max()) + 1):
         rows = groups == k
         colour = LOADS[round(k * (len(LOADS) - 1) / max(1, groups.max()))]
         axes.errorbar(
             table["slip"][rows], (table[key] / unit)[rows],
-            Z_90 * np.nan_to_num(std / unit)[rows], Z_90 * np.nan_to_num(slip_std)[rows],
+            Z_90 * (std / unit)[rows], Z_90 * slip_std[rows],
             fmt="o", ms=4, color=colour, elinewidth=1, label=f"{np.median(loads[rows]):.3g} N",
         )  # fmt: skip
     axes.axhline(0.0, color=PRIOR, lw=0.8, zorder=0)
@@ -94,7 +86,7 @@ def draw_over_slip(axes: Axes, table: Table, panel: PanelOverSlip) -> None:
     axes.legend(title="load", title_fontsize=9)
 
 
-def load_groups(loads: Floats) -> NDArray[np.int64]:
+def _load_groups(loads: Floats) -> NDArray[np.int64]:
     """Group (rows,) of each load: gaps of more than 10 % divide them, into at most five."""
     order = np.argsort(loads)
     gaps = np.diff(np.log(loads[order]))
@@ -105,37 +97,41 @@ def load_groups(loads: Floats) -> NDArray[np.int64]:
     return groups
 
 
-def _panels(series: WheelSeries) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
+def _std(table: Table, key: str) -> Floats:
+    """Standard errors of a column (rows,), 0 where they are not known."""
+    known = f"{key}_std" in table
+    return np.nan_to_num(table[f"{key}_std"]) if known else np.zeros(len(table))
+
+
+def run_panels(series: WheelSeries) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
+    """The panels of the picture of a run."""
     return [panel for panel in _PANELS if any(_finite(series, name) for name in panel[1])]
-
-
-def run_panels(series: WheelSeries) -> int:
-    """How many panels the picture of a run has."""
-    return len(_panels(series))
 
 
 def draw_run(series: WheelSeries, table: Table, panels: Any) -> None:
     """Draw the channels of a run over time into axes, one for each of `run_panels`."""
     rows = table.rows(table["run"] == series.run)
-    for axes, (title, names, labels) in zip(np.ravel(panels), _panels(series), strict=True):
+    for axes, (title, names, labels) in zip(np.ravel(panels), run_panels(series), strict=True):
         for s in series.stretches:
             colour = _LEFT_OUT if s.why else _WINDOW  # windows that touch are told apart
             axes.axvspan(s.start, s.stop, facecolor=colour, alpha=0.35, lw=0, zorder=0)
         scale = 1e3 if title.endswith("mm") else 1.0
-        shown: list[Floats] = []
-        means: list[Floats] = []
+        ends: list[Any] = [0.0]
         for name, label, colour in zip(names, labels, _LINES, strict=False):
             if not _finite(series, name):
                 continue
             values = scale * series.quantities[name]
             if name == "slip":
                 values = np.where(_turning(series), values, np.nan)
-            shown.append(values[np.isfinite(values)])
+            if np.isfinite(values).any():
+                ends += [*np.nanpercentile(values, [0.5, 99.5])]
             axes.plot(*_thinned(series.time, values), color=colour, lw=0.7, alpha=0.65)
             if label:
                 axes.plot([], [], color=colour, label=label)
-            means.append(_draw_means(axes, rows, name, scale))
-        _limits(axes, shown, means)
+            ends += _draw_means(axes, rows, name, scale)
+        # by percentiles, so that a single spike does not flatten the rest; all means are in
+        margin = 0.08 * (max(ends) - min(ends)) or 1.0
+        axes.set_ylim(min(ends) - margin, max(ends) + margin)
         axes.set_title(title, fontsize=9.5, pad=3)
         axes.grid(visible=False)
         axes.tick_params(labelsize=8.5)
@@ -146,27 +142,16 @@ def draw_run(series: WheelSeries, table: Table, panels: Any) -> None:
     axes.set_xlabel("time, s", fontsize=9.5)
 
 
-def _draw_means(axes: Axes, rows: Table, name: str, scale: float) -> Floats:
+def _draw_means(axes: Axes, rows: Table, name: str, scale: float) -> list[float]:
     """Draw the values of the rows with their 90 % intervals; returns those that are known."""
-    key = _COLUMNS.get(name)
-    if key is None or key not in rows or not len(rows):
-        return np.zeros(0)
-    std = rows[f"{key}_std"] if f"{key}_std" in rows else np.zeros(len(rows))
+    key = _COLUMNS.get(name, "")
+    if key not in rows or not len(rows):
+        return []
     axes.errorbar(
-        rows["time_s"], scale * rows[key], Z_90 * scale * np.nan_to_num(std), fmt="o", ms=3.2,
+        rows["time_s"], scale * rows[key], Z_90 * scale * _std(rows, key), fmt="o", ms=3.2,
         color="black", ecolor="black", elinewidth=1.2, capsize=2, zorder=4,
     )  # fmt: skip
-    return np.asarray(scale * rows[key][np.isfinite(rows[key])])
-
-
-def _limits(axes: Axes, shown: list[Floats], means: list[Floats]) -> None:
-    """Limits by percentiles, so that a single spike does not flatten the rest; all means are in."""
-    values = np.concatenate(shown) if shown else np.zeros(0)
-    if values.size:
-        ends = np.concatenate([np.percentile(values, [0.5, 99.5]), [0.0], *means])
-        low, high = float(ends.min()), float(ends.max())
-        margin = 0.08 * (high - low) or 1.0
-        axes.set_ylim(low - margin, high + margin)
+    return [*(scale * rows[key][np.isfinite(rows[key])])]
 
 
 def _finite(series: WheelSeries, name: str) -> bool:
@@ -190,9 +175,7 @@ def _thinned(time: Floats, values: Floats) -> tuple[Floats, Floats]:
         return time, values
     count = time.size // width
     blocks = values[: count * width].reshape(count, width)
-    known = np.isfinite(blocks)
-    low = np.where(known.any(axis=1), np.where(known, blocks, np.inf).min(axis=1), np.nan)
-    high = np.where(known.any(axis=1), np.where(known, blocks, -np.inf).max(axis=1), np.nan)
-    places = time[: count * width].reshape(count, width)
-    x = np.stack([places[:, 0], places[:, width // 2]], axis=1).reshape(-1)
-    return x, np.stack([low, high], axis=1).reshape(-1)
+    with catch_warnings():
+        simplefilter("ignore", RuntimeWarning)  # parts without a number
+        ends = np.stack([np.nanmin(blocks, axis=1), np.nanmax(blocks, axis=1)], axis=1)
+    return time[: count * width].reshape(count, width)[:, [0, width // 2]].ravel(), ends.ravel()

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import TYPE_CHECKING
 
-from soilml.log_import.figures import draw_run, plot_rows, rows_of_panels, run_panels
+from soilml.log_import.figures import draw_run, panels_over_slip, plot_rows, run_panels
 from soilml.remarks import Remark
 from soilml.report.numbers import format_quantity
 from soilml.report.report import Picture, Report
@@ -57,9 +57,8 @@ def _tables(found: ImportedLog) -> Iterator[ReportTable]:
     table = found.table
     names = [n for n in _SHOWN if n in table]
     columns = {n: table[n] for own in names for n in (own, f"{own}_std") if n in table}
-    yield ReportTable.of(
-        "Rows", columns, "Means of the steady windows; +- knows the autocorrelation."
-    )
+    about = "Means of the steady windows; +- knows the autocorrelation."
+    yield ReportTable.of("Rows", columns, about)
     seconds: dict[tuple[str, Remark | None], list[tuple[float, float]]] = {}
     for run, s in found.left_out():
         seconds.setdefault((run, s.why), []).append((s.start, s.stop))
@@ -96,7 +95,7 @@ def _constant(name: str) -> str:
 
 
 def _pictures(found: ImportedLog) -> Iterator[Picture]:
-    count = rows_of_panels(found.table, found.radius)
+    count = len(panels_over_slip(found.table, found.radius))
     yield Picture(
         "The rows over slip",
         partial(plot_rows, found.table, found.radius),
@@ -108,7 +107,7 @@ def _pictures(found: ImportedLog) -> Iterator[Picture]:
         "addition.",
     )
     for series in found.series[:MOST_RUNS]:
-        panels = run_panels(series)
+        panels = len(run_panels(series))
         notes = "; ".join(note.text for note in series.notes)
         yield Picture(
             f"Run {series.run}",

@@ -90,7 +90,10 @@ class ImportedLog(Result):
         return {
             "map": self.map_name,
             "logs": list(self.sources),
-            "rows": _rows(self.table),
+            "rows": [
+                {n: getattr(v, "item", lambda v=v: v)() for n, v in row.items()}
+                for row in self.table
+            ],
             "bias": {
                 key: {"share": n.share, "constant": n.constant} for key, n in self.bias.items()
             },
@@ -120,14 +123,3 @@ def _setting(noise: Noise) -> str:
     rounded = Noise(float(f"{noise.constant:.3g}"), float(f"{noise.share:.3g}"))
     value = rounded.as_setting()
     return f'"{value}"' if isinstance(value, str) else f"{value:g}"
-
-
-def _rows(table: Table) -> list[dict[str, Any]]:
-    names = list(table.columns)
-    return [
-        {
-            name: value.item() if isinstance(value, np.generic) else value
-            for name, value in zip(names, row, strict=True)
-        }
-        for row in zip(*table.columns.values(), strict=True)
-    ]

@@ -112,80 +112,80 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
             f"{path}: vane tests are not read: they give the undrained strength alone; needed are "
             "plate, shear or triaxial tests"
         )
-    found: dict[str, Floats] = {}
-    taken, left_out = [], []
-    sheared = any(_says(name, _SHEAR) for name in own.columns)
     if circles := _circles(path, own):
         return circles
-    # of two stresses, the strength comes before the residual one, and the shearing before what
-    # consolidated the sample
-    ordered = sorted(own.columns.items(), key=lambda c: _says(c[0], _SECOND))
-    for name, values in ordered:
-        unit = _unit(own, name)
-        kind = dimension(unit) if unit else None
-        weight = 9.80665 if kind == "kg" else 1.0  # a scale that shows the force in kg
-        kind = "N" if kind == "kg" else kind
-        column = _quantity(name, kind, {*found}, sheared)
-        if column and not unit:
-            raise InputError(
-                f"{path}: the column {name!r} states no unit; needed is one in its name, such as "
-                f"'{name} [mm]' or '{name} [kPa]', or the columns of `soilml bevameter --help`"
-            )
-        if column:
-            ours = next(u for c, u, _ in _QUANTITIES if c == column)
-            half = column.endswith("r_radius_m") and _says(name, (*_DIAMETER, "id", "od"))
-            share = weight * (0.5 if half else 1.0)
-            if column in _UPWARD and np.any(values) and not np.any(values > 0.0):
-                share = -share
-            kind = "kg" if weight > 1.0 else ours
-            found[column] = share * values * factor(unit, kind, f"{path}, column {name!r}")
-            sign = "-" * (share < 0.0) + "2 " * bool(half)
-            taken.append(f"{sign}{_our_name(column, sheared)} = {name!r} ({unit})")
-        elif not (_says(name, _TEST) and "test" not in found):
-            left_out.append(repr(name))
+    sheared = any(_says(name, _SHEAR) for name in own.columns)
+    found, taken, left_out = _taken(path, own, sheared)
     if "plate_radius_m" in found and "plate_length_m" in found and "plate_width_m" not in found:
         found["plate_width_m"] = found.pop("plate_radius_m")  # b of a strip is its width
     if "pressure_Pa" in found and "plate_width_m" in found:
         found.setdefault("plate_length_m", found["plate_width_m"])  # a pressure needs no area
     of_plates = not sheared and {"sinkage_m", "displacement"} & found.keys()
     if of_plates and not _PLATES & found.keys():
-        radius = stated_radius(agreed_constants([recordings]).common)
-        if radius:
+        if radius := stated_radius(agreed_constants([recordings]).common):
             found["plate_radius_m"] = np.full(len(own), radius)
             taken.append(f"plate_radius_m = {radius:g} m, as the file or its name states")
+        elif "load_N" in found and any(_says(name, _OF_PLATES) for name in own.columns):
+            raise InputError(
+                f"{path}: the size of the plate is missing; needed is a column such as "
+                "'plate radius [mm]', or a line before the header, such as '# plate radius: 50 mm'"
+            )
     if "shear_force" in found:
         if "plate_area_m2" not in found:
             raise InputError(
                 f"{path}: forces of a shear box need its area: a column such as 'area [cm^2]'"
             )
         area = found.pop("plate_area_m2")
-        found["shear_stress_Pa"] = found.pop("shear_force") / area
-        if "load_N" in found:
-            found["normal_stress_Pa"] = found.pop("load_N") / area
-    if (
-        of_plates
-        and "load_N" in found
-        and not _PLATES & found.keys()
-        and (any(_says(name, _OF_PLATES) for name in own.columns))
-    ):
-        raise InputError(
-            f"{path}: the size of the plate is missing; needed is a column such as "
-            "'plate radius [mm]', or a line before the header, such as '# plate radius: 50 mm'"
-        )
+        for force, stress in (("shear_force", "shear_stress_Pa"), ("load_N", "normal_stress_Pa")):
+            if force in found:
+                found[stress] = found.pop(force) / area
     plates = "load_N" in found and bool(_PLATES & found.keys())
     if not plates and not any(needed <= found.keys() for needed in _OF_TESTS):
         return None
     label, names = _names(own, found)
-    taken.insert(0, f"test = {label!r}" if label else _counted(names))
+    count = len({*names})
+    counted = "one test" if count == 1 else f"{count} tests, divided where they start again"
+    taken.insert(0, f"test = {label!r}" if label else counted)
     if "plate_diameter" in found:
         found["plate_radius_m"] = found.pop("plate_diameter") / 2.0
     if "displacement" in found:
-        ours, values = _our_name("displacement", sheared), found.pop("displacement")
-        found.setdefault(ours, values)
+        found.setdefault(_our_name("displacement", sheared), found.pop("displacement"))
     tests = text_column(names, lambda i: f"{path}, row {i + 1} of the tests, column {label!r}")
-    columns = {"test": tests, **found}
-    lines = np.arange(1, len(own) + 1)
+    columns, lines = {"test": tests, **found}, np.arange(1, len(own) + 1)
     return SoilTests(Table(columns, str(path), lines), tuple(taken), tuple(left_out))
+
+
+def _taken(
+    path: str | os.PathLike[str], own: Recording, sheared: bool
+) -> tuple[dict[str, Floats], list[str], list[str]]:
+    """Our columns, what was taken for what, and what was left out."""
+    found: dict[str, Floats] = {}
+    taken, left_out = [], []
+    # of two stresses, the strength comes before the residual one, and the shearing before what
+    # consolidated the sample
+    for name, values in sorted(own.columns.items(), key=lambda c: _says(c[0], _SECOND)):
+        unit = _unit(own, name)
+        kind = dimension(unit) if unit else None
+        weight = 9.80665 if kind == "kg" else 1.0  # a scale that shows the force in kg
+        column, ours = _quantity(name, "N" if kind == "kg" else kind, {*found}, sheared)
+        if not column:
+            if "test" in found or not _says(name, _TEST):
+                left_out.append(repr(name))
+            continue
+        if not unit:
+            raise InputError(
+                f"{path}: the column {name!r} states no unit; needed is one in its name, such as "
+                f"'{name} [mm]' or '{name} [kPa]', or the columns of `soilml bevameter --help`"
+            )
+        half = column.endswith("r_radius_m") and _says(name, (*_DIAMETER, "id", "od"))
+        share = weight * (0.5 if half else 1.0)
+        if column in _UPWARD and np.any(values) and not np.any(values > 0.0):
+            share = -share
+        size = factor(unit, "kg" if kind == "kg" else ours, f"{path}, column {name!r}")
+        found[column] = share * values * size
+        sign = "-" * (share < 0.0) + "2 " * bool(half)
+        taken.append(f"{sign}{_our_name(column, sheared)} = {name!r} ({unit})")
+    return found, taken, left_out
 
 
 def _unit(own: Recording, name: str) -> str:
@@ -204,35 +204,32 @@ def _says(name: str, known: Sequence[str], shortest: int = 1) -> bool:
     )  # fmt: skip
 
 
-def _quantity(name: str, kind: str | None, have: set[str], sheared: bool) -> str:
-    """The column that a name and the kind of its unit mean; "" for none, and for one that is taken.
+def _quantity(name: str, kind: str | None, have: set[str], sheared: bool) -> tuple[str, str]:
+    """The column that a name and the kind of its unit mean, and our unit; "" for none, and for one
+    that is taken.
 
     Without a unit only words of some letters count, so that the column is asked for it. Beside a
     shear stress a vertical displacement is none of the shear.
     """
     across = _says(name, (*_VERTICAL, "normal"))
     if sheared and across and (kind == "m" or (kind is None and _says(name, _WAYS))):
-        return ""
+        return "", ""
     for column, unit, known in _QUANTITIES:
-        if kind is not None and kind != unit:
+        if kind not in (None, unit) or not _says(name, known, _STEM + 1 if kind is None else 1):
             continue
-        if _says(name, known, 1 if kind is not None else _STEM + 1):
-            if column not in have:
-                taken = {"displacement", "shear_displacement_m" if sheared else "sinkage_m"} & have
-                return "" if column == "displacement" and taken else column
-            if not _says(name, (*_SHEAR, *_SECOND, *_VERTICAL)) or kind != "Pa":
-                continue
-            return ""
-    return ""
+        if column not in have:
+            taken = {"displacement", _our_name("displacement", sheared)} & have
+            return ("", "") if column == "displacement" and taken else (column, unit)
+        if _says(name, (*_SHEAR, *_SECOND, *_VERTICAL)) and kind == "Pa":
+            break
+    return "", ""
 
 
 def _our_name(column: str, sheared: bool) -> str:
     """The name in soilml; a displacement is that of the shear where there is a shear stress."""
-    if column == "plate_diameter":
-        return "2 plate_radius_m"
-    if column != "displacement":
-        return column
-    return "shear_displacement_m" if sheared else "sinkage_m"
+    ours = {"plate_diameter": "2 plate_radius_m",
+            "displacement": "shear_displacement_m" if sheared else "sinkage_m"}  # fmt: skip
+    return ours.get(column, column)
 
 
 def _names(own: Recording, found: dict[str, Floats]) -> tuple[str, list[str]]:
@@ -240,41 +237,28 @@ def _names(own: Recording, found: dict[str, Floats]) -> tuple[str, list[str]]:
     for name, cells in own.texts.items():
         if _says(name, _TEST) or len(own.texts) == 1:
             return name, [cell or "unnamed" for cell in cells]
+    curves = any(name in found for name in _ADVANCE)
     for name, values in own.columns.items():
-        if _says(name, _TEST) and np.isfinite(values).all() and _in_groups(values, found):
+        # it numbers tests and not samples: of strengths each row is a test
+        in_groups = not curves or np.unique(values).size < values.size
+        if in_groups and _says(name, _TEST) and np.isfinite(values).all():
             return name, [f"{value:g}" for value in values]
     number = np.cumsum(_starts(found, len(own)))
-    if not number.size or number[-1] == 0:
-        return "", [own.file.stem] * len(own)
-    return "", [f"{own.file.stem}_{n + 1}" for n in number]
-
-
-def _in_groups(values: Floats, found: dict[str, Floats]) -> bool:
-    """Whether a column numbers tests and not samples: of strengths each row is a test."""
-    curves = any(name in found for name in _ADVANCE)
-    return not curves or np.unique(values).size < values.size
+    several = number.size and number[-1] > 0
+    return "", [f"{own.file.stem}_{n + 1}" if several else own.file.stem for n in number]
 
 
 def _starts(found: dict[str, Floats], count: int) -> np.ndarray:
     """Whether a new test starts at each row (rows,)."""
     starts = np.zeros(count, dtype=bool)
-    advance = next((found[name] for name in _ADVANCE if name in found), None)
-    if advance is None or count < 2:
-        return starts
-    size = np.maximum.accumulate(np.nan_to_num(np.abs(advance)))[:-1]
-    starts[1:] |= np.diff(np.abs(advance)) < -_BACK * size
-    for name in _CONSTANT:
-        if name in found:
-            own = found[name]
+    advance = next((np.abs(found[name]) for name in _ADVANCE if name in found), None)
+    if advance is not None and count > 1:
+        size = np.maximum.accumulate(np.nan_to_num(advance))[:-1]
+        starts[1:] |= np.diff(advance) < -_BACK * size
+        for own in (found[name] for name in _CONSTANT if name in found):
             jumps = np.abs(np.diff(own)) > _OTHER * np.abs(own[:-1])
-            if np.mean(jumps) < _SELDOM:
-                starts[1:] |= jumps
+            starts[1:] |= jumps & (np.mean(jumps) < _SELDOM)
     return starts
-
-
-def _counted(names: list[str]) -> str:
-    count = len({*names})
-    return "one test" if count == 1 else f"{count} tests, divided where they start again"
 
 
 def _circles(path: str | os.PathLike[str], own: Recording) -> SoilTests | None:

@@ -14,12 +14,7 @@ from soilml.log_import.channels.runs import Run
 from soilml.log_import.channels.wheel_quantities import Conversion, SharedError
 from soilml.log_import.checks.columns import differing_units, unit_hints, with_shared_errors
 from soilml.log_import.checks.row_hints import RowsToCheck
-from soilml.log_import.checks.sensors import (
-    dead_sensors,
-    drop_clipped,
-    untared_load,
-    untared_sensors,
-)
+from soilml.log_import.checks.sensors import dead_sensors, drop_clipped, untared_sensors
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.rows import (
     WheelSeries,
@@ -135,7 +130,7 @@ class WheelRows:
             for role, why in dead.items():
                 text = f"run {run.name}: the sensor of [{role}]{self.of} is dead: {why}"
                 found.append(Remark("dead-sensor", text, (role, run.name)))
-        found += untared_sensors(self.wheel, self.inputs) + untared_load(self.wheel, self.inputs)
+        found += untared_sensors(self.wheel, self.inputs)
         return found + differing_units(self.wheel, self.runs[0])
 
     def shared_errors(self) -> tuple[dict[str, Noise], list[SharedError]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -69,25 +69,23 @@ def import_log(
     """
     said = progress or silent
     files = log_files(logs)
-    if isinstance(log_map, LogMap):
-        found = log_map
-    else:
-        found = map_from(log_map) if isinstance(log_map, Mapping) else read_map(log_map)
-    return import_recordings(read_logs(files, said), found, accept, said)
+    if not isinstance(log_map, LogMap):
+        log_map = map_from(log_map) if isinstance(log_map, Mapping) else read_map(log_map)
+    return import_recordings(read_logs(files, said), log_map, accept, said)
 
 
 def read_logs(files: Sequence[Path], progress: Progress) -> list[list[Recording]]:
     """The recordings of each log; the progress counts bytes."""
     sizes = [file.stat().st_size if file.is_file() else 0 for file in files]
-    total, recordings = sum(sizes), []
-    for i, file in enumerate(files):
-        before = sum(sizes[:i])
+    total, before, recordings = sum(sizes), 0, []
+    for file, size in zip(files, sizes, strict=True):
         progress("reading logs", before, total)
 
         def told(done: int, before: int = before) -> None:
             progress("reading logs", before + done, total)
 
         recordings.append(read_log(file, told))
+        before += size
     progress("reading logs", total, total)
     return recordings
 
@@ -124,11 +122,8 @@ def import_recordings(
         if steady:
             raise InputError(f"{found.source}: no row can be used: {[*remarks, 'empty'][0]}")
         raise FitError(f"{found.source}: no steady window can be used: {_most_frequent(wheels)}")
-    if steady:
-        remarks = [*remarks[:_MOST_LEFT], *_without_torque(table), *_without_errors(table)]
-    else:
-        remarks += _without_torque(table)
-    remarks += _several_wheels(table, recordings)
+    remarks = remarks[: _MOST_LEFT if steady else None]
+    remarks += [*_lacks(table, steady), *_several_wheels(table, recordings)]
     bias, shared = largest_errors([wheel.shared_errors() for wheel in wheels])
     radii = {wheel.wheel.radius.value if wheel.wheel.radius else None for wheel in wheels}
     radius = radii.pop() if len(radii) == 1 else None
@@ -154,47 +149,41 @@ def _most_frequent(wheels: Sequence[WheelRows]) -> str:
     return most.text if most else "the logs are empty"
 
 
-def _without_torque(table: Table) -> list[Remark]:
-    """A remark where no row has a torque, without which there is no estimate on board."""
-    if np.isfinite(table[column("torque")]).any():
-        return []
-    text = (
-        "no row has a torque: give the map a [torque] or [motor_current]; estimate needs one, and "
-        "identify a torque, a drawbar pull or a sinkage"
-    )
-    return [Remark("no-torque", text, ("torque",))]
-
-
-def _without_errors(table: Table) -> list[Remark]:
-    """A remark on measured quantities that no column gives a standard error of."""
+def _lacks(table: Table, steady: bool) -> Iterator[Remark]:
+    """Remarks where no row has a torque, without which there is no estimate on board; and on
+    measured quantities of a table of steady runs that no column gives a standard error of.
+    """
+    if not np.isfinite(table[column("torque")]).any():
+        text = (
+            "no row has a torque: give the map a [torque] or [motor_current]; estimate needs one, "
+            "and identify a torque, a drawbar pull or a sinkage"
+        )
+        yield Remark("no-torque", text, ("torque",))
     bare = [
         name for name in ("torque", "drawbar_pull", "sinkage")
         if column(name) in table and np.isfinite(table[column(name)]).any()
         and f"{column(name)}_std" not in table
     ]  # fmt: skip
-    if not bare:
-        return []
-    lines = ", ".join(f"{column(name)} = '5 %'" for name in bare)
-    shown = ", ".join(f"[{name}]" for name in bare)
-    text = (
-        f"no standard errors of {shown}: name their columns (std = 'COLUMN'), write noise = '5 %' "
-        f"there, or declare them in the model file, as [noise] {lines}: estimates are no better "
-        "than this number"
-    )
-    return [Remark("no-standard-errors", text, tuple(bare))]
+    if steady and bare:
+        lines = ", ".join(f"{column(name)} = '5 %'" for name in bare)
+        text = (
+            f"no standard errors of {', '.join(f'[{name}]' for name in bare)}: name their columns "
+            f"(std = 'COLUMN'), write noise = '5 %' there, or declare them in the model file, as "
+            f"[noise] {lines}: estimates are no better than this number"
+        )
+        yield Remark("no-standard-errors", text, tuple(bare))
 
 
 def _several_wheels(table: Table, logs: Sequence[Sequence[Recording]]) -> list[Remark]:
     """A remark on columns that say that the rows are of wheels of several sizes."""
-    if "gear" in table or "wheel" in table:
-        return []
     sizes: dict[str, set[float]] = {}
     for recording in (own for log in logs for own in log):
         for name, values in recording.columns.items():
             if is_size(name) and dimension(recording.units.get(name, "m")) == "m":
                 sizes.setdefault(name, set()).update(np.unique(values[np.isfinite(values)]))
+    named = "gear" in table or "wheel" in table
     for name, found in sizes.items():
-        if 1 < len(found) <= _MOST_SIZES:
+        if 1 < len(found) <= _MOST_SIZES and not named:
             text = (
                 f"the column {name!r} says {', '.join(f'{size:g}' for size in sorted(found)[:4])}: "
                 "rows of several wheels. Give each a gear ([wheel] gear_from, [gears.NAME]), or a "

@@ -15,9 +15,8 @@ from soilml.arrays import Floats
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError, did_you_mean
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.mapping.channel_map import GEARED
+from soilml.log_import.mapping.channel_map import GEARED, Uncertain
 from soilml.log_import.mapping.log_map import LogMap, Vehicle, WheelMap
-from soilml.log_import.mapping.uncertain_value import Uncertain
 from soilml.quantities import column
 
 #: Whether [bias] of a model file can say an offset of a quantity, and a share.

@@ -16,9 +16,8 @@ from soilml.log_import.channels.inputs import Inputs, moving, wheel_inputs
 from soilml.log_import.channels.resampling import on_grid
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import Candidate
-from soilml.log_import.mapping.channel_map import ChannelMap
+from soilml.log_import.mapping.channel_map import ChannelMap, Uncertain
 from soilml.log_import.mapping.log_map import WheelMap
-from soilml.log_import.mapping.uncertain_value import Uncertain
 from soilml.log_import.mapping.written_map import WrittenTable
 from soilml.log_import.units import spelling
 

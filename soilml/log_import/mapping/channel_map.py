@@ -1,4 +1,6 @@
-"""One channel of a map: where its samples are, their unit, sign, tare and errors."""
+"""One channel of a map: where its samples are, their unit, sign, tare and errors; values with unit
+and standard deviation: `\"38.5 mN m/A +- 3 %\"`.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +9,80 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 from soilml.config.measurement_noise import Noise, NoiseOfReading
 from soilml.errors import InputError
+from soilml.io.cell_text import read_number
 from soilml.io.declared_settings import For, Key, Numbers, OneOf, Pattern
 from soilml.io.toml_settings import Settings
-from soilml.log_import.mapping.uncertain_value import Uncertain, UncertainIn
 from soilml.log_import.units import dimension, factor
+
+_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_FORM = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*(?:(?:\+-|\+/-|±)\s*({_NUMBER})\s*(.*?))?\s*")
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """A value in the unit of soilml, and its standard deviation; 0 where it is exact."""
+
+    value: float
+    std: float = 0.0
+
+    @property
+    def relative(self) -> float:
+        """Standard deviation as a share of the value."""
+        return self.std / abs(self.value) if self.value else 0.0
+
+    def times(self, share: float) -> Uncertain:
+        """The value and its standard deviation, multiplied."""
+        return Uncertain(share * self.value, share * self.std)
+
+
+@dataclass(frozen=True)
+class UncertainIn:
+    """A number or a text such as `"0.15 m +- 1 %"`, above `above`; without its error if `exact`."""
+
+    unit: str
+    above: float = -math.inf
+    exact: bool = False
+
+    def take(self, settings: Settings, key: str, kind: str) -> Any:
+        """The value; raises `InputError` for a wrong form and for one that is too small."""
+        example = f"'0.15 {self.unit} +- 1 %'" if self.unit != "1" else "'0.7 +- 0.05'"
+        needed = f"a number in {self.unit}, or a text such as {example}"
+        given = settings.take(key, (int, float, str), needed)
+        found = parse_uncertain(given, self.unit, f"{settings.where} {key}")
+        if found is None or found.std < 0.0:
+            settings.fail(f"{key} is {given!r}; needed is {needed}")
+        if not found.value > self.above:
+            settings.fail(f"{key} is {given!r}; needed is a value above {self.above:g}")
+        return found.value if self.exact else found
+
+
+def parse_uncertain(text: str | int | float, ours: str, where: str) -> Uncertain | None:
+    """A number, or a text such as `"0.15 m +- 1 %"`; None for another form.
+
+    The standard deviation is in the value's own unit, in another one, or in per cent of the value.
+    Raises `InputError` for a unit that does not give `ours`.
+    """
+    if not isinstance(text, str):
+        return Uncertain(float(text)) if math.isfinite(text) else None
+    match = _FORM.fullmatch(text)
+    if match is None:
+        return None
+    try:
+        number, std = read_number(match[1]), read_number(match[3] or "0")
+    except ValueError:  # more than a number can hold
+        return None
+    scale, unit = factor(match[2], ours, where), match[4]
+    value, size = number * scale, scale
+    if unit == "%" and match[2] != "%":
+        size = abs(value) / 100.0
+    elif unit:
+        size = factor(unit, ours, where)
+    return Uncertain(value, std * size)
+
 
 #: Unit of soilml of each channel that a map may have, and what it is.
 ROLES: dict[str, tuple[str, str]] = {

@@ -20,8 +20,14 @@ from soilml.io.declared_settings import (
     take_declared,
 )
 from soilml.io.toml_settings import Settings, read_settings
-from soilml.log_import.mapping.channel_map import LEG_ROLES, NOTHING, ROLES, ChannelMap
-from soilml.log_import.mapping.uncertain_value import Uncertain, UncertainIn
+from soilml.log_import.mapping.channel_map import (
+    LEG_ROLES,
+    NOTHING,
+    ROLES,
+    ChannelMap,
+    Uncertain,
+    UncertainIn,
+)
 from soilml.parameters import Parameter
 
 #: Keys that say where samples come from, of which a table has one.
@@ -218,37 +224,27 @@ def _take_map(settings: Settings) -> LogMap:
         if radius is not None or runs.each_row:
             settings.fail("has [wheel_leg] beside [wheel] radius or [runs] each_row; remove one")
         radius = leg.length
-    gears = {}
-    for name, gear in named_tables(settings, "gears", WheelKeys, "gear").items():
-        if gear.size is None:
-            settings.fail(
-                f"[gears.{name}]: the radius is missing; needed is radius or diameter, such as "
-                "'0.15 m +- 1 %'"
-            )
-        gears[name] = gear.size
+    gears = {n: g.size for n, g in named_tables(settings, "gears", WheelKeys, "gear").items()}
+    if bare := [name for name, size in gears.items() if size is None]:
+        settings.fail(
+            f"[gears.{bare[0]}]: the radius is missing; needed is radius or diameter, such as "
+            "'0.15 m +- 1 %'"
+        )
     named = settings.table("wheels")
     defaults = _shared_keys(settings, named.content)
     shared = _take_channels(settings, leg is not None)
     wheels = []
-    for name in named.content:
-        table = named.table(name)
-        own = Settings(_with_shared_keys(table.content, defaults), table.where, settings.files)
-        channels = shared | _take_channels(own, leg is not None)
-        keys = take_declared(WheelKeys, own, "wheel")
-        wheels.append(
-            WheelMap(
-                name,
-                keys.size or gears.get(keys.gear or common.gear) or radius,
-                channels,
-                keys.gear or common.gear,
-                keys.axle,
-                keys.gear_from or common.gear_from,
-                leg,
-            )
-        )
-    if not wheels:
-        size = gears.get(common.gear) or radius
-        wheels = [WheelMap("", size, shared, common.gear, "", common.gear_from, leg)]
+    for name in named.content or ("",):
+        channels, keys = shared, WheelKeys()
+        if name:
+            table = named.table(name)
+            content = _with_shared_keys(table.content, defaults)
+            own = Settings(content, table.where, settings.files)
+            channels = shared | _take_channels(own, leg is not None)
+            keys = take_declared(WheelKeys, own, "wheel")
+        gear, pattern = keys.gear or common.gear, keys.gear_from or common.gear_from
+        size = keys.size or gears.get(gear) or radius
+        wheels.append(WheelMap(name, size, channels, gear, keys.axle, pattern, leg))
     for wheel in wheels:
         _check_wheel(settings, wheel, vehicle, bool(gears))
     found = LogMap(
@@ -260,7 +256,7 @@ def _take_map(settings: Settings) -> LogMap:
         vehicle=vehicle,
         windows=take_declared(WindowSettings, settings.table("windows")),
         left_out=tuple(take_declared(LeaveOut, one) for one in settings.tables("leave_out")),
-        gears=gears,
+        gears={name: size for name, size in gears.items() if size is not None},
     )
     settings.finish()
     return found
@@ -272,13 +268,11 @@ def _shared_keys(settings: Settings, wheels: Mapping[str, Any]) -> dict[str, dic
     A table that names no source of samples is taken out of `settings`: it serves the wheels only.
     """
     own = {role for wheel in wheels.values() if isinstance(wheel, dict) for role in wheel}
-    found = {}
-    for role in ROLES:
-        content = settings.content.get(role)
-        if role in own and isinstance(content, dict):
-            found[role] = content
-            if not {*_SOURCES} & content.keys():
-                settings.take(role, dict, f"a table [{role}]")
+    shared = {role: settings.content.get(role) for role in ROLES if role in own}
+    found = {role: content for role, content in shared.items() if isinstance(content, dict)}
+    for role, content in found.items():
+        if not {*_SOURCES} & content.keys():
+            settings.take(role, dict, f"a table [{role}]")
     return found
 
 
@@ -288,11 +282,9 @@ def _with_shared_keys(
     """The table of a wheel, whose channels have the shared keys that they do not state."""
     content = dict(wheel)
     for role, keys in shared.items():
-        own = content.get(role)
-        if isinstance(own, dict):
-            sourced = {*_SOURCES} & own.keys()
-            kept = {k: v for k, v in keys.items() if not (sourced and k in _SOURCES)}
-            content[role] = kept | own
+        if isinstance(own := content.get(role), dict):
+            left_out = _SOURCES if {*_SOURCES} & own.keys() else ()
+            content[role] = {k: v for k, v in keys.items() if k not in left_out} | own
     return content
 
 

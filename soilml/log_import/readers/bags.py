@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
+import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from soilml.errors import InputError, MissingLibraryError
-from soilml.log_import.readers.bag_blocks import check_blocks
+from soilml.io.bounds import BLOCK_BYTES
 from soilml.log_import.readers.message_fields import TopicColumns, protobuf_fields, thin_largest
 from soilml.log_import.recording import Recording
 from soilml.optional_imports import need
 from soilml.remarks import Remark, texts
 
 _BETWEEN = 2000  # Messages between two looks at memory and progress
+_MCAP, _ROS1, _ZSTD = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"\x28\xb5\x2f\xfd"
+_CHUNK = 6  # Record of MCAP
 
 
 def read_bag(path: Path, progress: Callable[[int], None] | None = None) -> list[Recording]:
@@ -92,12 +95,8 @@ def _mcap_messages(path: Path, notes: list[Remark]) -> Iterator[tuple[str, float
                     notes.append(Remark("unknown-encoding", text, (channel.topic,)))
             decode = decoders[channel.id]
             if decode is not None:
-                yield (
-                    channel.topic,
-                    1e-9 * message.log_time,
-                    decode(message.data),
-                    len(message.data),
-                )
+                data = message.data
+                yield channel.topic, 1e-9 * message.log_time, decode(data), len(data)
 
 
 def _decoder(schema: Any, encoding: str) -> Callable[[bytes], Any] | None:
@@ -123,3 +122,62 @@ def _decoder(schema: Any, encoding: str) -> Callable[[bytes], Any] | None:
         store.deserialize_ros1 if encoding == "ros1" else store.deserialize_cdr
     )
     return lambda data: decode(data, name)
+
+
+def check_blocks(file: Path) -> None:
+    """Raise `InputError` for a compressed block that unpacks to more than may be read.
+
+    file: An MCAP file or a bag of ROS 1; of others nothing is said.
+    """
+    with file.open("rb") as opened:
+        head = opened.read(len(_ROS1))
+        if head.startswith(_MCAP):
+            opened.seek(len(_MCAP))
+            sizes = _mcap_sizes(opened)
+        elif head == _ROS1:
+            sizes = _ros1_sizes(opened)
+        else:
+            return
+        for size in sizes:
+            BLOCK_BYTES.check(file, size)
+
+
+def _mcap_sizes(opened: BinaryIO) -> Iterator[int]:
+    """Of each chunk (https://mcap.dev/spec): opcode, length, times, size unpacked, checksum."""
+    while len(head := opened.read(9)) == 9:
+        kind, length = struct.unpack("<BQ", head)
+        after = opened.tell() + length
+        if kind == _CHUNK and len(fixed := opened.read(32)) == 32:
+            (size,) = struct.unpack_from("<Q", fixed, 16)
+            (name,) = struct.unpack_from("<I", fixed, 28)
+            opened.seek(min(name, 64) + 8, 1)
+            yield max(size, _zstd_size(opened.read(18)))
+        opened.seek(after)
+
+
+def _ros1_sizes(opened: BinaryIO) -> Iterator[int]:
+    """Of each chunk (wiki.ros.org/Bags/Format/2.0): its header states `size`."""
+    while len(head := opened.read(4)) == 4:
+        header = opened.read(min(struct.unpack("<I", head)[0], 1 << 20))
+        for_data = opened.read(4)
+        if len(for_data) < 4:
+            return
+        at = 0
+        while at + 4 <= len(header):  # its fields, NAME=VALUE
+            (size,) = struct.unpack_from("<I", header, at)
+            name, _, value = header[at + 4 : at + 4 + size].partition(b"=")
+            if name == b"size" and len(value) == 4:
+                yield struct.unpack("<I", value)[0]
+            at += 4 + size
+        opened.seek(struct.unpack("<I", for_data)[0], 1)
+
+
+def _zstd_size(frame: bytes) -> int:
+    """The size that a frame of Zstandard states (RFC 8878, 3.1.1.1), which its library trusts."""
+    if len(frame) < 18 or not frame.startswith(_ZSTD):
+        return 0
+    mark = frame[4]
+    single, width = mark >> 5 & 1, (0, 2, 4, 8)[mark >> 6]
+    width = width or single
+    at = 5 + (not single) + (0, 1, 2, 4)[mark & 3]
+    return int.from_bytes(frame[at : at + width], "little") + 256 * (width == 2)

@@ -90,12 +90,9 @@ class TopicColumns:
 
         The time of receipt jitters; the stamp is when the sensor was read.
         """
-        stamps = np.asarray(self._stamps)
-        clock = np.asarray(self.clock)
-        set_ = np.isfinite(stamps) & (stamps > 0.0)
-        if set_.all() and np.ptp(stamps) > 0.5 * np.ptp(clock):
-            return stamps
-        return clock
+        stamps, clock = np.asarray(self._stamps), np.asarray(self.clock)
+        known = bool((np.isfinite(stamps) & (stamps > 0.0)).all())
+        return stamps if known and np.ptp(stamps) > 0.5 * np.ptp(clock) else clock
 
 
 def thin_largest(topics: Iterable[TopicColumns]) -> None:
@@ -114,11 +111,9 @@ def fields_of(message: Any, prefix: str = "", depth: int = 0) -> Iterator[tuple[
     if depth > _DEEPEST:
         return
     items = (
-        message.items()
-        if isinstance(message, dict)
-        else ((k, getattr(message, k)) for k in _names(message))
+        message if isinstance(message, dict) else {k: getattr(message, k) for k in _names(message)}
     )
-    content = {key: value for key, value in items if not key.startswith("_")}
+    content = {key: value for key, value in items.items() if not key.startswith("_")}
     names = content.get("name", content.get("names", content.get("joint_names")))
     for key, value in content.items():
         place = f"{prefix}{key}"

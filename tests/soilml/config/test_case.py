@@ -96,10 +96,6 @@ def test_discrepancy_is_read_written_and_read_again(tmp_path):
     assert "length" not in case_as_toml(read_case(written(tmp_path, MODEL + DISCREPANCY)))
 
 
-def test_an_amplitude_is_a_share_of_the_range_and_a_constant_in_quadrature():
-    assert Discrepancy(constant=0.3, share=0.02).amplitude(20.0) == pytest.approx(0.5)
-
-
 def test_lengths_that_differ_between_channels_cannot_be_written(tmp_path):
     case = read_case(written(tmp_path, MODEL + DISCREPANCY))
     case.discrepancy["torque_Nm"] = Discrepancy(share=0.02, slip_length=0.1)

@@ -123,24 +123,6 @@ def test_functions_of_its_error_have_the_same_covariance(ends):
     assert np.sqrt(np.mean(difference**2)) < 0.01
 
 
-def test_mean_and_error_are_continuous_at_the_edge():
-    edge = np.asarray([0.5 - 1e-9, 0.5 + 1e-9])
-    for values in part().mean_and_std(edge, np.asarray([60.0, 60.0])):
-        assert values[1] == pytest.approx(values[0], abs=1e-7)
-    load = np.asarray([100.0 - 1e-7, 100.0 + 1e-7])
-    for values in part().mean_and_std(np.asarray([0.3, 0.3]), load):
-        assert values[1] == pytest.approx(values[0], abs=1e-7)
-
-
-def test_parts_of_a_channel_add_up():
-    both = Remainder((part(), part(mean=(0.0, 1.0, 0.0))))
-    one, other = (p.mean_and_std(np.asarray([0.2]), np.asarray([60.0])) for p in both.parts)
-    mean, std = both.mean_and_std("torque", 0.2, 60.0)
-    assert mean == pytest.approx(one[0][0] + other[0][0])
-    assert std == pytest.approx(np.hypot(one[1][0], other[1][0]))
-    assert both.mean_and_std("sinkage", 0.2, 60.0) == (0.0, 0.0)
-
-
 def test_predictions_and_simulated_rows_have_the_mean(case):
     slip, load = np.asarray([0.1, 0.3, 0.5]), np.full(3, 60.0)
     bare = case.model(case.soil, Operating(slip=slip, load=load))

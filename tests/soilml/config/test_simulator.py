@@ -13,10 +13,9 @@ from soilml import Model, Operating, Wheel, identify, read_case, soil
 from soilml.cli import main
 from soilml.config.simulator import emulator_of, read_runs
 from soilml.errors import InputError
-from soilml.experiment_design.simulator_runs import further_runs, space_filling_runs
+from soilml.experiment_design.simulator_runs import space_filling_runs
 from soilml.io.read_table import read_table
 from soilml.io.text_tables import csv_text
-from soilml.numerics.gaussian_emulator import fit_emulator
 from soilml.quantities import column
 
 MODEL = (
@@ -150,18 +149,6 @@ def test_the_wheel_as_a_black_box_gives_the_soil_of_the_front_door(folder, box):
     assert np.all(blind.std < found.std)
 
 
-@pytest.mark.slow
-def test_the_averaged_soil_has_typical_errors_beside_the_emulator_s(folder, box):
-    rows = read_table(folder / "runs.csv")
-    fit = identify(box, rows)
-    exact = identify(box, rows, method="posterior")
-    assert any(one.discrepancy for one in fit.explanations)
-    assert np.all(fit.std >= exact.std)
-    # effects that act at a contact explain nothing of a simulator
-    named = {name for one in fit.explanations for name in one.effects}
-    assert not {"slip-sinkage", "exit-angle", "grousers"} & named
-
-
 def test_outside_the_runs_there_is_no_answer(box):
     case = box
     at = Operating(slip=np.asarray([0.2, 0.2, 0.95]), load=np.asarray([60.0, 200.0, 60.0]))
@@ -219,17 +206,6 @@ def test_trust_needs_code_that_it_trusts(tmp_path, monkeypatch, capsys):
     (tmp_path / "model.toml").write_text(MODEL + SIMULATOR)
     assert main(["design-runs", "model.toml", "--trust"]) == 2
     assert "neither python nor command" in capsys.readouterr().err
-
-
-def test_further_runs_lie_where_there_are_none(folder):
-    case = read_case(folder / "black_box.toml", with_simulator=False)
-    table = read_table(folder / "simulated.csv")
-    part = table.rows(table["slip"] < 0.35)
-    more = further_runs(case, part, 20)
-    # among the runs there is one near by; beyond them, and at the ends of the design, there is none
-    assert np.count_nonzero(more["slip"] > 0.5) >= 8
-    assert not np.any((more["slip"] > 0.15) & (more["slip"] < 0.33))
-    assert len({tuple(row) for row in np.stack(list(more.values()), axis=1)}) == 20
 
 
 def refused(tmp_path, text="", table=None, **files):
@@ -309,17 +285,3 @@ def test_gap_works_on_a_black_box_and_writes_a_model_that_has_it(folder, tmp_pat
     assert report["status"] != "no-gap"
     again = read_case(tmp_path / "gap/model.toml", with_explanations=True)
     assert again.simulator is not None and again.model.gear.name == "simulator"
-
-
-def test_an_emulator_goes_through_smooth_runs_and_knows_where_it_does_not_know():
-    rng = np.random.default_rng(0)
-    u = rng.random((80, 2))
-
-    def law(u):
-        return np.stack([np.sin(4 * u[:, 0]) + u[:, 1], 1e-4 * u[:, 0] ** 2], axis=1)
-
-    emulator = fit_emulator(u, law(u))
-    at = rng.random((50, 2))
-    assert emulator(at) == pytest.approx(law(at), abs=2e-2)
-    assert np.all(emulator.std(u) < 0.1 * emulator.std(np.asarray([[3.0, 3.0]])))
-    assert np.all(emulator.error < 0.02 * law(u).std(axis=0))

@@ -48,14 +48,6 @@ def test_loads_are_those_of_equal_springs_under_a_rigid_body():
     assert places @ plane == pytest.approx(load)
 
 
-def test_loads_of_several_slopes_at_once():
-    rover = WheeledRover(40.0, (0.08, 0.0, 0.35), SIX)
-    slopes = np.asarray([0.0, 0.1, 0.3])
-    assert rover.loads(slopes) == pytest.approx(
-        np.stack([rover.loads(slope) for slope in slopes], axis=1)
-    )
-
-
 def test_a_wheel_that_leaves_the_ground_is_named():
     tall = WheeledRover(40.0, (0.0, 0.0, 1.0), {k: SIX[k] for k in SIX if "middle" not in k})
     with pytest.raises(InputError, match="the wheel front-left leaves the ground on a slope of 30"):

@@ -57,13 +57,6 @@ def test_decimal_numbers_are_read_as_python_does(text):
     assert read_number(text) == float(text)
 
 
-@pytest.mark.parametrize("text", ["1.0", "1e3", "+-1", "9" * 19, "1_0"])
-def test_whole_numbers_have_digits_only(text):
-    with pytest.raises(ValueError):
-        read_whole_number(text)
-    assert read_whole_number("-12") == -12
-
-
 @pytest.mark.parametrize("text", [text for text in REFUSED if text.strip() and "," not in text])
 def test_cells_and_selections(text, tmp_path):
     file = tmp_path / "runs.csv"

@@ -7,7 +7,6 @@ import pytest
 
 from soilml import read_table
 from soilml.errors import InputError
-from soilml.io.atomic_files import refuse_device
 from soilml.io.toml_settings import read_settings
 from soilml.log_import.readers import read_log
 
@@ -18,12 +17,6 @@ def test_a_device_is_refused_in_one_line(read, device):
     with pytest.raises(InputError) as caught:
         read(device)
     assert str(caught.value) == f"{device} cannot be read: it is a device; needed is a file"
-
-
-def test_files_folders_and_pipes_are_none(tmp_path):
-    os.mkfifo(tmp_path / "pipe")
-    for path in (tmp_path, tmp_path / "pipe"):
-        refuse_device(path)
 
 
 def test_tables_and_settings_are_read_from_pipes(tmp_path):

@@ -83,18 +83,6 @@ def test_extra_columns_can_be_passed_over(tmp_path):
     assert "weather" not in table
 
 
-def test_a_truncated_parquet_file_is_refused(tmp_path, small_data):
-    whole = small_data.read_bytes()
-    for cut in (len(whole) // 2, 10, 0):
-        with pytest.raises(TableError, match="not a complete Parquet file"):
-            read_table(written(tmp_path, whole[:cut], "cut.parquet"), RUNS)
-
-
-def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(TableError, match="no such file"):
-        read_table(tmp_path / "none.csv")
-
-
 def test_a_table_with_names_of_another_laboratory_is_told_all_at_once(tmp_path):
     (tmp_path / "bin.csv").write_text("Test No,Slip (%),Load (N),Torque (Nm)\n1,5,50,1.5\n")
     with pytest.raises(TableError, match=r"none of its columns is known: 'Test No', .*torque_Nm'"):

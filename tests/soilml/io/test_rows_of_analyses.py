@@ -110,11 +110,3 @@ def test_a_table_that_no_file_held_is_checked_as_files_are(changes, said):
         assert "\n" not in str(raised.value)
     kept = as_table(Table(COLUMNS, "mine", metadata={"a": "b"}))
     assert (kept.source, kept.metadata) == ("mine", {"a": "b"})
-
-
-def test_a_table_of_a_file_stays_and_single_values_are_a_row():
-    table = Table(COLUMNS, "runs.csv", np.arange(2, 14))
-    assert as_table(table) is table
-    assert as_table({"slip": 0.1, "load_N": 60, "run": "a"})["run"].tolist() == ["a"]
-    blank = as_table({"slip": [0.1, 0.2], "torque_Nm": [None, np.float32(2.0)]})
-    np.testing.assert_array_equal(blank["torque_Nm"], [np.nan, 2.0])

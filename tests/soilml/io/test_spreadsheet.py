@@ -13,9 +13,7 @@ from soilml.errors import InputError, TableError
 from soilml.io import spreadsheet
 from soilml.io.bounds import SHEET_BYTES, SHEET_CELLS
 from soilml.io.read_table import read_table
-from soilml.log_import.channels.runs import run_names
 from soilml.log_import.readers import read_log
-from soilml.log_import.soil_tests import read_soil_tests
 
 openpyxl = pytest.importorskip("openpyxl")
 RUNS = [["run", "slip", "load_N", "torque_Nm"], ["a", 0.1, 60, 2.5], ["a", 0.3, 60.5, None]]
@@ -82,12 +80,6 @@ def test_a_log_has_names_and_units_as_in_text(tmp_path):
     assert recording.about == ("rig 3", "radius: 0.15 m")
 
 
-def test_sheets_of_one_file_are_runs_of_their_own(tmp_path):
-    file = save(tmp_path / "log.xlsx", A=LOG, B=LOG)
-    names = [read_log(f"{file}#{sheet}")[0].file for sheet in "AB"]
-    assert run_names(names) == ["log_A", "log_B"]
-
-
 def test_dates_are_a_clock(tmp_path):
     start = datetime.datetime(2024, 5, 31, 12)
     times = [start + datetime.timedelta(seconds=i) for i in range(5)]
@@ -118,12 +110,6 @@ def test_per_cent_of_the_cells_and_of_the_head(tmp_path):
     (recording,) = read_log(save(tmp_path / "log.xlsx", A=fill))
     assert recording.columns["slip"].tolist() == [0, 1, 2, 3, 4]
     assert recording.columns["share"].tolist() == [0, 0.01, 0.02, 0.03, 0.04]
-
-
-def test_plate_tests_are_read(tmp_path):
-    rows = [["test", "p [kPa]", "z [mm]", "b [mm]"], *[["A", 10.0 * i, i, 50] for i in range(1, 6)]]
-    found = read_soil_tests(save(tmp_path / "plates.xlsx", A=rows))
-    np.testing.assert_allclose(found.table["pressure_Pa"], 1e4 * np.arange(1, 6))
 
 
 def merged(*ranges):

@@ -170,13 +170,6 @@ def test_windows_of_a_sensor_that_clips_are_without_it(tmp_path, capsys):
     assert np.isfinite(rows["torque_Nm"][rows["slip"] < 0.2]).all()
 
 
-def test_the_mark_names_the_next_column(tmp_path):
-    log, _ = log_of(tmp_path, M=lambda rng, d: noisy(rng, 0.5 * d.torque, 0.1))
-    log.write_text(log.read_text().replace("torque [Nm]", "T"))
-    text = init(tmp_path, [log])
-    assert "CHANGE: its name alone does not say so, and no unit is stated; else perhaps 'M'" in text
-
-
 def test_a_named_clock_that_jitters_beats_a_counter(tmp_path):
     log, d = log_of(tmp_path, seq=lambda rng, d: np.arange(d.t.size))
     text = log.read_text().replace("time [s]", "timestamp")
@@ -269,18 +262,6 @@ def test_kinds_of_files_with_the_number_of_the_run(tmp_path, capsys):
     assert {line.split(",")[0] for line in rows} == {"1", "2"}
     assert main(["import", "--init", *map(str, logs[:-1])]) == 2
     assert "run 2: no file of the kind 'ft'" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("name", ["Raddurchmesser (mm)", "D [mm]", "largeur (mm)", "r_w [m]"])
-def test_sizes_of_wheels_by_other_names_are_said(name, tmp_path, capsys):
-    log = write(tmp_path / "t.csv", {
-        name: [200, 200, 300, 300], "pass": [1, 2, 1, 2], "load [N]": [60] * 4,
-        "slip [-]": [0.1, 0.3, 0.1, 0.3], "torque [Nm]": [1.3, 2, 1.6, 2.4]})  # fmt: skip
-    text = init(tmp_path, [log])
-    assert imported(tmp_path, [log], text) == 0 and "[sinkage]" not in text
-    assert f"the column {name.split(' [')[0].split(' (')[0]!r} says" in capsys.readouterr().err
-    rows = np.genfromtxt(tmp_path / "runs.csv", delimiter=",", names=True, encoding=None)
-    assert rows["pass"].tolist() == [1, 2, 1, 2]
 
 
 @pytest.mark.parametrize("was_set", [True, False])

@@ -87,16 +87,6 @@ def test_a_gear_without_a_radius_is_asked_for(tmp_path):
         import_log(logs, tmp_path / "map.toml")
 
 
-def test_other_gears_have_the_radius_of_the_wheel():
-    settings = {
-        "wheel": {"gear": "wide", "radius": 0.1}, "gears": {"wide": {"diameter": "0.3 m"}},
-        "wheel_speed": {"value": 1.0}, "ground_speed": {"value": 0.1}, "load": {"value": 50},
-    }  # fmt: skip
-    assert map_from(settings).wheels[0].radius.value == 0.15
-    settings["wheel"] = {"gear": "narrow", "radius": 0.1}
-    assert map_from(settings).wheels[0].radius.value == 0.1
-
-
 def test_rows_of_a_table_have_the_radius_of_their_gear(tmp_path):
     file = tmp_path / "runs.csv"
     stages = [(0.1, 50), (0.3, 60), (0.5, 70)]

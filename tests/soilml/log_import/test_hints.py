@@ -93,18 +93,6 @@ def test_a_rotation_in_another_unit(tmp_path, factor, cause):
     assert set(imported.table["slip"]) == {0.3}
 
 
-def test_slip_in_per_cent(tmp_path):
-    d = drive(np.random.default_rng(32), seconds=8)
-    slip = np.where(d.rim > 0, 100 * (1 - d.ground / np.maximum(d.rim, 1e-9)), 0.0)
-    columns = {"t": d.time, "s": slip, "w": d.rim / RADIUS, "T": d.torque, "Fz": d.load}
-    path = write_csv(tmp_path / "log.csv", columns)
-    content = {k: v for k, v in right().items() if k != "ground_speed"} | {"slip": {"column": "s"}}
-    with pytest.raises(InputError, match="in per cent; write unit = '%'"):
-        import_log(path, content)
-    content["slip"]["unit"] = "%"
-    np.testing.assert_allclose(import_log(path, content).table["slip"], [0.1, 0.3, 0.5], atol=0.02)
-
-
 def rows(**changes):
     slip = np.array([0.1, 0.2, 0.4, 0.6])
     table = {"slip": slip, "load_N": np.full(4, LOAD), "torque_Nm": torque_law(slip),
@@ -162,16 +150,3 @@ def test_identify_estimate_and_gap_give_the_same_hint(tmp_path, model_file, caps
 def rows_of_torque():
     slip = np.linspace(0.05, 0.6, 12)
     return slip, torque_law(slip)
-
-
-@pytest.mark.parametrize(("load", "torque", "cause"), [
-    (0.06, 3.0, "the load is in kN"), (60.0, 3000.0, "the torque is in mN m"),
-])  # fmt: skip
-def test_the_load_tells_which_of_two_units_is_a_thousand_times_off(load, torque, cause):
-    columns = {
-        "slip": np.array([0.1, 0.3, 0.5]),
-        "load_N": np.full(3, load),
-        "torque_Nm": torque * np.array([0.5, 1.0, 1.2]),
-    }
-    (hint,) = table_hints(columns, 0.15)
-    assert hint.code == "traction-out-of-range" and cause in hint.text

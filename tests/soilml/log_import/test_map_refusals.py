@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from described_rigs import pull_curves, six_axes_load_on_y
+from described_rigs import six_axes_load_on_y
 
 from soilml.errors import InputError
 from soilml.log_import import import_log, init_map
@@ -65,11 +65,3 @@ def test_a_load_that_is_not_of_the_mass_is_refused(on_its_side, tmp_path):
         (tmp_path / "map.toml").write_text(text)
         found = import_log(logs, tmp_path / "map.toml", accept=True)
         assert ("load-not-of-mass" in {r.code for r in found.implausible}) == wrong
-
-
-def test_rows_with_load_and_pull_exchanged_are_refused(tmp_path):
-    logs, _ = pull_curves(np.random.default_rng(5), tmp_path)
-    text = edited(edited(edited(init_map(logs), '"DBP"', '"\0"'), '"Wv"', '"DBP"'), "\0", "Wv")
-    (tmp_path / "map.toml").write_text(text)
-    with pytest.raises(InputError, match=r"drawbar pull is .* times the load"):
-        import_log(logs, tmp_path / "map.toml")

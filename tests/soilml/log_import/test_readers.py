@@ -130,14 +130,6 @@ def test_a_cell_is_a_number_in_plain_digits_alone(tmp_path, cell):
     assert recording.columns["M"][2] == 10.0
 
 
-def test_a_column_in_digits_of_another_script_is_text(tmp_path):
-    digits = str.maketrans("0123456789", "".join(chr(0x966 + k) for k in range(10)))
-    rows = "".join(f"{i},{i},{f'{i}:00:{i}'.translate(digits)}\n" for i in range(10, 30))
-    (tmp_path / "log.csv").write_text("t,F,M\n" + rows, "utf-8")
-    (recording,) = read_log(tmp_path / "log.csv")
-    assert list(recording.texts) == ["M"]
-
-
 @pytest.mark.parametrize("mark", [".", ","])
 def test_a_long_log_of_numbers_is_read_as_its_lines_are(mark, tmp_path):
     """A text at its end leaves it to the reader of lines, and the numbers are the same."""
