@@ -22,7 +22,7 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	@echo "making the environment in $(VENV) (about a minute) ..."
 	@$(PYTHON) -m venv $(VENV)
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
-	  --disable-pip-version-check --editable '.[ground,logs,map,serve,torch,dev]'
+	  --disable-pip-version-check --editable '.[ground,logs,map,serve,sklearn,torch,dev]'
 	@touch $@
 
 demo: $(VENV)/.ready ## the story of README: data, training, comparison, a gap, a better board; one picture

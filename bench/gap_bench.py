@@ -172,9 +172,6 @@ def _said(report: GapReport) -> Row:
         "gap_probability": report.gap_probability,
         "reasons": texts(report.reasons),
         "gap": {k: (s.before, s.after) for k, s in report.gap.items()},
-        "beside_remainder": {
-            k: (s.before, s.after) for k, s in report.gap_beside_remainder.items()
-        },
         "codes": sorted({r.code for r in (*report.reasons, *report.notes, *report.conditions)}),
     }
 

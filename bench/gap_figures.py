@@ -308,12 +308,7 @@ def ratios(sets: Sequence[Judged], part: str, over: str, of: str = "named") -> n
 
 
 def _held_out(sets: Sequence[Judged]) -> Iterator[Figure]:
-    shown = [
-        pair
-        for s in sets
-        for part in (s.get("gap", {}), s.get("beside_remainder", {}))
-        for pair in part.values()
-    ]
+    shown = [pair for s in sets for pair in s.get("gap", {}).values()]
     name = "figures that grow while shown as reduction"
     yield share(name, shown, lambda pair: pair[1] > GREW * pair[0], "<= 0.0")
 

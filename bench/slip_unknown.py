@@ -38,7 +38,7 @@ METHODS = ("filter", "known soil", "line")
 #: Bands of the slip of the first wheel.
 BANDS = ((-1.0, 0.1), (0.1, 0.3), (0.3, 1.0))
 ABOUT = (
-    f"Drives of docs/how-to/slip-unknown.md, {len(TESTED)} a line, by the reference wheel of "
+    f"Drives of docs/how-to/drive.md, {len(TESTED)} a line, by the reference wheel of "
     "`datagen/blind_sets`: three soils of 60 rows each, on slopes of -11 to 20 degrees. "
     "Friction and gain of each drive and the zero of the pitch are drawn for each drive. Each "
     "cell: rmse of the slip of a wheel, coverage of its 90 % interval, its median width. *Filter*: "

@@ -48,7 +48,7 @@ SLIP_LIMIT = 0.6
 Z_90 = 1.645
 BANDS = {"said 0 to 0.2": (0.0, 0.2), "0.2 to 0.8": (0.2, 0.8), "0.8 to 1": (0.8, 1.0)}
 ABOUT = (
-    f"Drives of docs/how-to/soil-map.md by the wheel of `datagen/blind_sets`, {len(TESTED)} a "
+    f"Drives of docs/how-to/drive.md by the wheel of `datagen/blind_sets`, {len(TESTED)} a "
     "line: four wheels, 240 rows each over 60 m of a winding path. Soils change sharply up to "
     "twice, and drift smoothly by lengths of 3 to 12 m. Torque noise is 2 %, slip noise 0.02, and "
     "1 % of the rows have twice their torque. Five stretches of 4 m are held out, and all "

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from drawn_errors import DrawnErrors
 
 from datagen.blind_sets.plans import MECHANISMS
-from datagen.blind_sets.reference_wheel import Mechanism, WheelState, solve_equilibrium
+from datagen.blind_sets.reference_wheel import (
+    ContactArc,
+    ContactPoints,
+    Mechanism,
+    WheelState,
+    solve_equilibrium,
+)
 from datagen.recipe import read_recipe
 from soilml import Operating
 from soilml.physics.effects import FlatRim
@@ -74,6 +80,7 @@ LAW_WORLDS = (
     World("flat rim", rim=4e-5),
     World("shear curve with a peak", mechanism=("shear-softening/peak-and-decay", 0.3)),
     World("shear stress that falls to half", mechanism=("shear-softening", 1.4)),
+    World("shear stress that falls beyond two moduli", mechanism=("falls-beyond-two-moduli", 0.5)),
     World("curved strength envelope", mechanism=("curved-envelope/logarithmic", 0.08)),
     World("stress-shift", mechanism=("stress-shift", 0.2)),
     World("sidewall-shear", mechanism=("sidewall-shear", 1.0)),
@@ -102,8 +109,21 @@ NOISE_OF_LOAD = tuple(World(f"load std {s:.0%}", load_std=s) for s in (0.02, 0.0
 
 
 def mechanisms() -> dict[str, Mechanism]:
-    """Mechanisms of all tiers by their keys."""
-    return {key: mechanism for tier in MECHANISMS.values() for key, mechanism in tier.items()}
+    """Mechanisms of all tiers by their keys, and a shear stress that falls."""
+    known = {key: mechanism for tier in MECHANISMS.values() for key, mechanism in tier.items()}
+    falls = replace(known["shear-softening"], shear=_falls_beyond_two_moduli)
+    return known | {"falls-beyond-two-moduli": falls}
+
+
+def _falls_beyond_two_moduli(
+    points: ContactPoints, arc: ContactArc, rows: WheelState, share: float
+) -> Floats:
+    """Janosi and Hanamoto's stress up to j = 2 K, which then falls by `share`, over 2 K to 1/e.
+
+    Its modulus is that of the first slope; that of Wong's hump is about twice as large.
+    """
+    beyond = np.maximum(np.abs(points.shear_displacement) / rows.shear_modulus - 2.0, 0.0)
+    return np.asarray(points.shear * (1.0 - share * -np.expm1(-0.5 * beyond)))
 
 
 def unlisted_worlds() -> tuple[World, ...]:

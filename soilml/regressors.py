@@ -24,6 +24,7 @@ _HOME = {
     "GaussianRegressor": "training.regressors.gaussian_regressor",
     "LSSVM": "training.regressors.lssvm",
     "LinearGaussian": "training.regressors.linear_gaussian",
+    "ScikitLearn": "training.regressors.scikit_learn",
 }
 
 

@@ -17,15 +17,8 @@ PAGES = sorted(
 #: pages whose Python blocks are run
 RUN = (
     "docs/concepts/sets.md",
-    "docs/how-to/choose-wheels.md",
-    "docs/how-to/import.md",
     "docs/how-to/judge-a-model.md",
-    "docs/how-to/pull.md",
-    "docs/how-to/soil-map.md",
     "docs/how-to/train.md",
-    "docs/papers/comin2017.md",
-    "docs/papers/nagatani2009.md",
-    "docs/reference/tables.md",
     "exported/README.md",
 )
 

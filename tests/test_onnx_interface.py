@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import namedtuple
 from pathlib import Path
 
 import numpy as np
@@ -25,33 +26,47 @@ RELEASED = {
     "wheel_mlp": "single",
     "wheel_linear": "single",
 }
-TYPES = {"float32": "tensor(float)", "bool": "tensor(bool)"}
+
+
+Entry = namedtuple("Entry", "kinds shape type default")
+#: An item such as "- `slip_std`, `load_std` (rows), default -1: text".
+ENTRY = re.compile(r"^- ((?:`\w+`(?:, )?)+) \((.*?)\)(?: (bool))?(?:, default (.*?))?: ", re.M)
+
+
+def section(heading):
+    return PAGE.split(f"\n## {heading}\n")[1].split("\n## ")[0]
 
 
 def table(heading, first):
     """Rows of the table below a heading whose first column has this name, as dicts."""
-    section = PAGE.split(f"## {heading}\n")[1].split("\n## ")[0]
-    lines = [line for line in section.splitlines() if line.startswith("|")]
+    lines = [line for line in section(heading).splitlines() if line.startswith("|")]
     cells = [[cell.strip(" `") for cell in line[1:-1].split("|")] for line in lines]
     head, _, *rows = cells
     assert head[0] == first
     return [dict(zip(head, row, strict=True)) for row in rows]
 
 
-INPUTS, OUTPUTS = table("Inputs", "input"), table("Outputs", "output")
+def entries(heading):
+    """Inputs or outputs of the page: `(kinds, shape, type, default)` by name, as a list."""
+    found = []
+    for part in section(heading).split("\n**")[1:]:
+        kinds = re.findall(r"\w+", part.partition("files**")[0].lower())
+        for names, shape, kept, default in ENTRY.findall(part):
+            for name in re.findall(r"\w+", names):
+                found.append((name, Entry(kinds, shape.split(", "), kept or "float", default)))
+    return found
 
 
-def of_kind(rows, kind):
-    return {next(iter(row.values())): row for row in rows if kind in row["kinds"].split(", ")}
+INPUTS, OUTPUTS = entries("Inputs"), entries("Outputs")
+
+
+def of_kind(found, kind):
+    return {name: one for name, one in found if {kind, "all"} & set(one.kinds)}
 
 
 @pytest.fixture(scope="module")
 def files(whole_file, any_set_file, small_model):
     return {"whole": whole_file, "set": any_set_file, "single": small_model}
-
-
-def rank(row):
-    return len(row["shape"].strip("()").split(","))
 
 
 @pytest.mark.parametrize("kind", ["single", "whole", "set"])
@@ -64,10 +79,10 @@ def test_inputs_and_outputs_are_those_of_the_files(files, kind):
     ):
         assert set(documented) == {value.name for value in found}
         for value in found:
-            row = documented[value.name]
-            assert value.type == TYPES[row["type"]], value.name
-            assert len(value.shape) == rank(row), value.name
-    required = {name for name, row in of_kind(INPUTS, kind).items() if row["default"] == "required"}
+            entry = documented[value.name]
+            assert value.type == f"tensor({entry.type})", value.name
+            assert len(value.shape) == len(entry.shape), value.name
+    required = {name for name, one in of_kind(INPUTS, kind).items() if not one.default}
     assert required == {value.name for value in session.get_inputs()}
 
 
@@ -90,8 +105,7 @@ def test_outputs_have_the_shapes_of_the_page(files, kind):
             documented, session.run(list(documented), feed | branch), strict=True
         ):
             if value.size:
-                shape = documented[name]["shape"].strip("()").split(", ")
-                known = [sizes.get(part, part) for part in shape]
+                known = [sizes.get(part, part) for part in documented[name].shape]
                 assert list(value.shape) == [int(part) for part in known], name
                 seen.add(name)
     rows_may_be_out = {"memory_out"} if kind == "set" else set()

@@ -71,11 +71,6 @@ def _chains(script: ModuleType) -> None:
     script.OUT = _folder()
 
 
-def _import_wheel_leg(script: ModuleType) -> None:
-    script.FOLDER, script.picture = _folder(), _nothing
-    script.STANCES, script.SLIPS, script.SEEDS = 5, (0.2,), (2,)
-
-
 def _first_rows(script: ModuleType, count: int) -> None:
     """The script reads the first rows of its tables alone."""
     import numpy as np
@@ -107,7 +102,6 @@ PROBES: dict[str, Shrink] = {
     "examples/papers/lunar_lssvm.py": _lunar,
     "examples/papers/chains.py": _chains,
     "examples/papers/tracked_robot.py": _tracked_robot,
-    "examples/import/wheel_leg.py": _import_wheel_leg,
     "examples/gravity/moon.py": _moon,
     "examples/map/compare.py": _map_compare,
     "examples/slip/compare.py": _slip_compare,

@@ -19,13 +19,14 @@ from training.regressors.gaussian_mlp import GaussianMLP
 from training.regressors.gaussian_regressor import FeatureSubset, GaussianRegressor
 from training.regressors.linear_gaussian import LinearGaussian
 from training.regressors.lssvm import LSSVM
+from training.regressors.scikit_learn import ScikitLearn
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScale, ErrorScales
 from training.set_posterior.families.dimensionless_family import DimensionlessFamily
 from training.set_posterior.response_surface import ResponseSettings
 
 #: Catalogue of regressors by `[[regressor]] type`: a new one is a file and a line here.
 REGRESSORS: dict[str, type[GaussianRegressor]] = {
-    **{cls.type_name: cls for cls in (LSSVM, GaussianMLP, LinearGaussian)},
+    **{cls.type_name: cls for cls in (LSSVM, GaussianMLP, LinearGaussian, ScikitLearn)},
     "lssvm": LSSVM,
 }
 
@@ -173,7 +174,11 @@ def _take_regressor(settings: Settings, seed: int) -> GaussianRegressor:
 
 
 def _take_parameter(settings: Settings, key: str, default: Any) -> Any:
-    """A hyperparameter: whole numbers, a whole number, or a number that is finite."""
+    """A hyperparameter: a name, a table, whole numbers, a whole number, or a finite number."""
+    if isinstance(default, str):
+        return settings.text(key)
+    if key == "parameters":
+        return settings.take(key, dict, "a table of hyperparameters")
     if isinstance(default, tuple | list):
         values = tuple(settings.take(key, list, "a list of whole numbers"))
         if not all(type(v) is int and 1 <= v <= 4096 for v in values):

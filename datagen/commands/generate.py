@@ -7,8 +7,8 @@ import sys
 from contextlib import nullcontext
 from pathlib import Path
 
-from soilml.cli.option_values import whole_number
-from soilml.cli.options import InputFile, add_effects_option, add_workers_option
+from soilml.cli.option_values import whole_number_from
+from soilml.cli.options import InputFile
 from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
 
@@ -43,32 +43,15 @@ recipe and seed give the same bytes, on any number of processes (--workers).
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "recipe",
-        type=InputFile,
-        metavar="RECIPE.toml",
-        help="recipe file, or the name of a packaged recipe",
-    )
-    parser.add_argument("out", metavar="OUT.parquet", help="file to write")
-    parser.add_argument(
-        "--rows",
-        type=whole_number,
-        metavar="N",
-        help="number of rows (default: that of the recipe)",
-    )
-    parser.add_argument(
-        "--seed", type=whole_number, help="seed of the random numbers (default: that of the recipe)"
-    )
-    add_workers_option(parser)
-    parser.add_argument(
-        "--device",
-        metavar="NAME",
-        help="solve by torch on this device, such as cuda or cuda:1, in one process; results agree "
-        "with those of other machines to 1e-9, not to the last bit",
-    )
-    add_effects_option(parser)
+ARGUMENTS = (
+    ("recipe RECIPE.toml", "recipe file, or the name of a packaged recipe", InputFile),
+    ("out OUT.parquet", "file to write"),
+    ("--rows N", "number of rows (default: that of the recipe)", whole_number_from(1)),
+    ("--seed N", "of the random numbers (default: that of the recipe)", whole_number_from(0)),
+    "workers",
+    ("--device NAME", "solve by torch on this device, such as cuda; agrees to 1e-9"),
+    "effects",
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

@@ -22,8 +22,8 @@ from soilml.physics.soils.gravity_law import LAWS, GravityChange
 from soilml.report.aligned_text import format_table
 from soilml.report.figure_style import save_png
 from soilml.traction import Traction, predict_traction
-from soilml.traction.by_load import MeasuredRange, predictions_by_load, slip_grid
 from soilml.traction.gravity import draws_at_gravity
+from soilml.traction.pull_and_slope import MeasuredRange, predictions_by_load, slip_grid
 from soilml.traction.soil_draws import measured_soil
 
 HERE, OUT = Path(__file__).parent, Path("demo/gravity/moon.png")

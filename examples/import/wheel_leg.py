@@ -25,8 +25,8 @@ from soilml.papers.comin2017_slip import FOOT
 from soilml.physics.soils import Soil
 from soilml.quantities import Z_90, column
 from soilml.report.aligned_text import format_table
-from soilml.systems.wheel_legs import VIBRATION_SLIP, SpringLeg, simulate_stance
-from soilml.systems.wheel_legs.stances import GRAVITY
+from soilml.systems.wheel_legs.stances import GRAVITY, SpringLeg, simulate_stance
+from soilml.systems.wheel_legs.stride_relations import VIBRATION_SLIP
 
 Floats = NDArray[np.float64]
 

@@ -8,25 +8,24 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import linregress
 
 from soilml import Case, Model, simulate, soil
 from soilml.config.measurement_noise import Noise
 from soilml.numerics.prior import Prior
-from soilml.papers.wang2018 import LEVEL, plateau, printed
-from soilml.systems.tracked_robot import (
+from soilml.papers.published import printed
+from soilml.papers.wang2018 import LEVEL, implied_points, plateau
+from soilml.systems.tracked_robot.group_identification import (
+    PARAMETERS,
+    GroupFits,
+    identify_groups,
+)
+from soilml.systems.tracked_robot.robot import (
     BEYOND_PEAK,
     GROUSERS,
     WANG2018,
     DiscreteGrousers,
-    GroupFits,
     grouser_pull,
-    identify_groups,
-    linear_regression,
-)
-from soilml.systems.tracked_robot.group_identification import (
-    PARAMETERS,
-    implied_points,
-    predicted,
 )
 
 GAINS = {"sand": 20.0, "clay": 150.0}  # Printed gains by grousers, N
@@ -123,19 +122,22 @@ def eight_groups() -> tuple[Case, GroupFits]:
             f"{groups.remaining_fraction[name]:22.0%}  "
             f"{groups.pooled.remaining_fraction[name]:8.0%}"
         )
-    print(f"hardly identified or not identified: {', '.join(groups.unidentified)}")
+    weak = [name for name, left in groups.remaining_fraction.items() if left > 0.5]
+    print(f"hardly identified or not identified: {', '.join(weak)}")
     return case, groups
 
 
 def regression_of_fresh_rows(case: Case, groups: GroupFits, fresh: object) -> None:
     """Regression of new measurements on the predictions of the groups' average."""
-    line = linear_regression(mean_prediction(case, groups, fresh), fresh["drawbar_pull_N"])
-    book = printed()
+    predicted, count = mean_prediction(case, groups, fresh), len(fresh)
+    line = linregress(predicted, fresh["drawbar_pull_N"])
+    r2 = line.rvalue**2
+    book = printed("wang2018")
     n = implied_points(book["regression_r2"], book["regression_f"])
     print("\nMeasured against predicted, fresh rows      r2       F   slope  points")
     print(
-        f"here                                    {line.r2:6.3f}  {line.f:6.1f}  {line.slope:6.2f}"
-        f"  {line.points:6d}"
+        f"here                                    {r2:6.3f}  {r2 / (1 - r2) * (count - 2):6.1f}"
+        f"  {line.slope:6.2f}  {count:6d}"
     )
     print(
         f"printed (points follow from r2 and F)   {book['regression_r2']:6.3f}  "
@@ -145,7 +147,8 @@ def regression_of_fresh_rows(case: Case, groups: GroupFits, fresh: object) -> No
 
 def mean_prediction(case: Case, groups: GroupFits, table: object) -> np.ndarray:
     """Pull predicted by the average of the groups, N."""
-    return predicted(case, replace(groups.pooled, values=groups.mean), table)
+    soil_ = case.with_values(dict(zip(groups.names, groups.mean.tolist(), strict=True)))
+    return simulate(soil_, table["slip"], table["load_N"])["drawbar_pull_N"]
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import numpy as np
 from hidden_world import LaterSoils
 
 from soilml import Estimator
-from soilml.gap.report.pictures import draw_bars
+from soilml.gap.pictures import draw_bars
 from soilml.io.atomic_files import atomic_output
 from soilml.quantities import Z_90, column
 from soilml.report.figure_style import AFTER, BEFORE, report_style

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from soilml import __version__
 from soilml.cli.old_spellings import present_words
-from soilml.cli.options import add_screen_options, declared_outputs, input_files, need_for_options
+from soilml.cli.options import declare, declared_outputs, input_files, need_for_options
 from soilml.cli.process import (
     StopSignals,
     Terminated,
@@ -167,8 +167,10 @@ def parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
         sub = into.add_parser(
             word, help=helps.get(name, ""), description=module.DESCRIPTION, formatter_class=layout
         )
-        module.add_arguments(sub)
-        add_screen_options(sub, getattr(module, "FORMATS", ()))
+        declare(sub, (*module.ARGUMENTS, "screen"))
+        if formats := getattr(module, "FORMATS", ()):
+            text = "form of the result on standard output; tables of rows are CSV into a pipe"
+            sub.add_argument("--format", choices=formats, help=text)
         if words is not None:
             root.known = [option for option in sub._option_string_actions if len(option) > 2]
             root.prog = sub.prog

@@ -7,29 +7,27 @@ from collections.abc import Mapping
 
 from soilml.errors import InputError
 
-#: Former names of commands.
-COMMANDS = {
-    "models": "show models",
-    "soils": "show soils",
-    "effects": "show effects",
+#: Former names of commands whose second word is not theirs.
+_RENAMED = {
     "doctor": "setup check",
-    "completion": "setup completion",
-    "slip": "drive slip",
-    "map": "drive map",
     "design": "plan wheels",
     "audit": "plan effects",
     "advise": "plan next",
     "design-runs": "plan runs",
-    "export-c": "export c",
-    "export-fusion": "export fusion",
-    "export-step": "export step",
-    "export-slip": "export slip",
-    "export-soil": "export soil",
-    "climb": "paper climb",
-    "sensor-wheel": "paper sensor-wheel",
-    "wheel-leg": "paper wheel-leg",
-    "walk": "paper walk",
     "papers": "paper numbers",
+}
+#: Former names of all commands.
+COMMANDS = _RENAMED | {
+    former: f"{group} {word}"
+    for group, prefix, names in (
+        ("show", "", "models soils effects"),
+        ("setup", "", "completion"),
+        ("drive", "", "slip map"),
+        ("export", "export-", "c fusion step slip soil"),
+        ("paper", "", "climb sensor-wheel wheel-leg walk"),
+    )
+    for word in names.split()
+    for former in (prefix + word,)
 }
 #: Former names of options, by command.
 OPTIONS: Mapping[str, Mapping[str, str]] = {
@@ -45,8 +43,6 @@ OPTIONS: Mapping[str, Mapping[str, str]] = {
     "paper walk": {"--speed": "--angular-speed"},
     "plan next": {"--slips": "--slip", "--loads": "--load", "--radii": "--radius"},
 }
-#: Options whose value is the first argument now.
-FIRST = {"drive slip": "--rover", "drive map": "--rover"}
 
 
 def present_words(words: list[str]) -> list[str]:
@@ -54,46 +50,19 @@ def present_words(words: list[str]) -> list[str]:
 
     Raises `InputError` where a former option and its present name are both given.
     """
-    name = COMMANDS.get(words[0], "") if words else ""
-    found = [*name.split(), *words[1:]] if name else list(words)
-    if name:
+    if words and (name := COMMANDS.get(words[0])):
         _hint(f"`soilml {words[0]}` is now `soilml {name}`")
-    length = 1 if found[:1] and found[0] in {*OPTIONS, *FIRST} else 2
-    command, rest = " ".join(found[:length]), found[length:]
-    for old, new in OPTIONS.get(command, {}).items():
-        rest = _renamed(rest, old, new)
-    if (first := FIRST.get(command)) is not None:
-        rest = _moved(rest, first)
-    if command == "export fusion" and len(rest) > 1 and rest[0].endswith(".c"):
-        rest = [*rest[1:], rest[0]]
-        _hint("the C file is now the last argument: soilml export fusion MODEL.onnx ... OUT.c")
-    return [*found[:length], *rest]
-
-
-def _renamed(words: list[str], old: str, new: str) -> list[str]:
-    """The words with another name of an option."""
-    given = [word.partition("=")[0] for word in words]
-    if old not in given:
-        return words
-    if new in given or (new == "--out" and "-o" in given):
-        raise InputError(f"{old} is now {new}, which is given too; run the command once for each")
-    _hint(f"{old} is now {new}")
-    return [
-        new + word[len(old) :] if name == old else word
-        for name, word in zip(given, words, strict=True)
-    ]
-
-
-def _moved(words: list[str], option: str) -> list[str]:
-    """The words with the value of an option as the first argument."""
-    for i, word in enumerate(words):
-        if word == option and i + 1 < len(words):
-            _hint(f"{option} is now the first argument")
-            return [words[i + 1], *words[:i], *words[i + 2 :]]
-        if word.startswith(f"{option}="):
-            _hint(f"{option} is now the first argument")
-            return [word.partition("=")[2], *words[:i], *words[i + 1 :]]
-    return words
+        words = [*name.split(), *words[1:]]
+    former = next((OPTIONS[c] for n in (1, 2) if (c := " ".join(words[:n])) in OPTIONS), {})
+    given = {word.partition("=")[0] for word in words}
+    for old, new in former.items():
+        if old not in given:
+            continue
+        if new in given or (new == "--out" and "-o" in given):
+            raise InputError(f"{old} is now {new}, which is given too; run the command once each")
+        _hint(f"{old} is now {new}")
+    parts = (word.partition("=") for word in words)
+    return [former.get(name, name) + equals + value for name, equals, value in parts]
 
 
 def _hint(text: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -18,17 +18,9 @@ if TYPE_CHECKING:
 _MAX_SHOWN = 80  # A longer option value is cut in an error message
 
 
-def number(text: str) -> float:
-    """A finite number; raises `ArgumentTypeError` for anything else."""
-    try:
-        return read_number(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} given; needed is a number") from None
-
-
 @dataclass(frozen=True)
 class NumberFrom:
-    """The type of an option that is a number from `lower` to `upper`, in `unit`.
+    """The type of an option that is a number from `lower` to `upper`, in `unit`; or a whole one.
 
     Raises `ArgumentTypeError` for anything else.
     """
@@ -36,43 +28,28 @@ class NumberFrom:
     lower: float
     upper: float
     unit: str = ""
+    whole: bool = False
 
     def __call__(self, text: str) -> float:
-        value = number(text)
-        if not self.lower <= value <= self.upper:
+        kind = "a whole number from " if self.whole else ""
+        try:
+            value = read_whole_number(text) if self.whole else read_number(text)
+        except ValueError:
+            value = None
+        if value is None or not self.lower <= value <= self.upper:
             raise argparse.ArgumentTypeError(
-                f"{text!r} given; needed is {self.lower:g} to {self.upper:g} {self.unit}".rstrip()
+                f"{text!r} given; needed is {kind}{self.lower:.10g} to {self.upper:.10g} "
+                f"{self.unit}".rstrip()
             )
         return value
 
 
-def slip_limit(text: str) -> float:
-    """A slip between 0 and 1; raises `ArgumentTypeError` for anything else."""
-    value = number(text)
-    if not 0.0 < value < 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r} given; needed is a slip between 0 and 1")
-    return value
+SLIP = NumberFrom(0.001, 0.999)  # A slip of a driving gear
 
 
-def whole_number(text: str) -> int:
-    """A whole number; raises `ArgumentTypeError` for anything else."""
-    try:
-        return read_whole_number(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number") from None
-
-
-def whole_number_from(lower: int, upper: int | None = None) -> Callable[[str], int]:
-    """A function from a text to a whole number in these bounds, as `whole_number` is."""
-    ends = f", {lower} or more" if upper is None else f" from {lower} to {upper}"
-
-    def bounded(text: str) -> int:
-        value = whole_number(text)
-        if not lower <= value <= (10**9 if upper is None else upper):
-            raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number{ends}")
-        return value
-
-    return bounded
+def whole_number_from(lower: int, upper: int = 10**9) -> NumberFrom:
+    """The type of an option that is a whole number in these bounds."""
+    return NumberFrom(lower, upper, whole=True)
 
 
 def parse_costs(args: argparse.Namespace) -> dict[str, float]:

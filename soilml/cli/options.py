@@ -7,7 +7,10 @@ of usage answer at once.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from keyword import iskeyword
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,26 +38,107 @@ class InputFile(str):
 
 
 class OutputFile(str):
-    """Value of an argument that names a file to be written; see `add_output`."""
+    """Value of an argument that names a file to be written, whose ending its metavar has."""
 
     __slots__ = ()
 
 
-def add_output(
-    parser: argparse.ArgumentParser, name: str, file: str, text: str, other: str = ""
-) -> None:
-    """Declare an option or argument for an output, whose ending is that of `file`, or `other`."""
-    suffix = Path(file).suffix
+#: Further marks of an argument in its declaration; see `declare`.
+REQUIRED, OPTIONAL, SEVERAL, ANY = (
+    {"required": True}, {"nargs": "?"}, {"nargs": "+"}, {"nargs": "*"}
+)  # fmt: skip
+REPEATED: dict[str, Any] = {"action": "append", "default": []}
+#: An argument: its words and what it means, then the type of its value and marks; or the name of
+#: shared ones.
+Argument = str | tuple[Any, ...]
+_WORDS = re.compile(r"(\S+)(?: (.+?))??(?: \((.+)\))?")
+#: Arguments that several commands share, by name.
+SHARED: dict[str, tuple[Argument, ...]] = {
+    "model": (("model MODEL.toml", "gear, soil, priors and noise", InputFile),),
+    "model-and-runs": (
+        "model",
+        ("runs RUNS.csv", "measured rows: CSV, Parquet or .xlsx", InputFile),
+    ),
+    "model-and-any-runs": (
+        "model",
+        ("runs RUNS.csv", "measured rows: CSV, Parquet or .xlsx", InputFile, OPTIONAL),
+    ),
+    "exact-model": (
+        ("--exact-model", "assume a perfect model, and sensors exactly as in the model file"),
+    ),
+    "gravity": (
+        ("--gravity G", "gravity that is predicted for: earth, moon, mars, or in m/s^2"),
+        ("--tested-at G", "gravity of the rows (default: that of [rover], else earth)"),
+        ("--gravity-law LAW", "change of soil by gravity: open (default), constant, proportional"),
+    ),
+    "by": (("--by COLUMN", "one result for each value of this column, such as run"),),
+    "free": (("--free A,B,...", "parameters to identify (default: those with a prior)"),),
+    "effects": (
+        ("--effects FILE.py", "effects of your own, which [[effect]] may name; runs it", InputFile),
+    ),
+    "report": (
+        ("--report FOLDER", "folder for report.html, with picture, table, warnings, report.json"),
+    ),
+    "gear": (("--gear NAME", "which of the gears [gears.NAME] of the model file"),),
+    "ignore-extra": (("--ignore-extra", "ignore columns whose names are not known"),),
+    "rows": (
+        ("--where COLUMN=VALUE", "use only the rows with this value"),
+        ("--gear NAME", "use only the rows of this gear, and [gears.NAME] of the model file"),
+        "ignore-extra",
+    ),
+    "seed": (("--seed N (0)", "seed of the random numbers", whole_number_from(0)),),
+    "cost": (
+        ("--cost KIND=NUMBER", "cost of a kind of run to add (else 1); can be repeated", REPEATED),
+    ),
+    "workers": (
+        ("--workers N", "number of processes (default: one for each core)", whole_number_from(1)),
+    ),
+    "screen": (
+        ("--quiet", "print no remarks on standard error"),
+        ("--verbose", "print all details of the result"),
+    ),
+}
+_SHORT = {"--out": "-o", "--quiet": "-q", "--verbose": "-v"}
 
-    def checked(path: str) -> OutputFile:
-        try:
-            output_files(path, other if other and path.lower().endswith(other) else suffix)
-        except InputError as error:
-            raise argparse.ArgumentTypeError(str(error)) from None
-        return OutputFile(path)
 
-    short = ("-o",) if name == "--out" else ()
-    parser.add_argument(*short, name, type=checked, metavar=file, help=text)
+def declare(parser: argparse.ArgumentParser, arguments: Iterable[Argument]) -> None:
+    """Declare arguments by their words: `name METAVAR`, `--name METAVAR (default)`, or a switch.
+
+    A metavar such as FILE.csv|.json says which endings an output may have.
+    """
+    for own in arguments:
+        if isinstance(own, str):
+            declare(parser, SHARED[own])
+            continue
+        words, text, *marks = own
+        found = _WORDS.fullmatch(words)
+        assert found is not None, words
+        name, metavar, default = found.groups()
+        given: dict[str, Any] = {"help": text}
+        if name.startswith("-") and metavar is None:
+            given["action"] = "store_true"
+        elif metavar is not None:
+            given["metavar"] = metavar.partition("|")[0]
+        if default is not None:
+            given |= {"default": default, "help": f"{text} (default: {default})"}
+        for mark in marks:
+            given |= mark if isinstance(mark, dict) else {"type": mark}
+        if given.get("type") is OutputFile:
+            given["type"] = partial(_output, metavar)
+        if iskeyword(own_name := name.lstrip("-")):
+            given["dest"] = f"{own_name}_"
+        short = (_SHORT[name],) if name in _SHORT else ()
+        parser.add_argument(*short, name, **given)
+
+
+def _output(metavar: str, path: str) -> OutputFile:
+    """An output with one of the endings of its metavar."""
+    file, _, other = metavar.partition("|")
+    try:
+        output_files(path, other if other and path.lower().endswith(other) else Path(file).suffix)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return OutputFile(path)
 
 
 def is_json(args: argparse.Namespace) -> bool:
@@ -66,71 +150,13 @@ def is_json(args: argparse.Namespace) -> bool:
     return bool(found)
 
 
-def add_screen_options(parser: argparse.ArgumentParser, formats: Sequence[str] = ()) -> None:
-    """Declare -q and -v, and --format where a command prints a result in these formats."""
-    if formats:
-        parser.add_argument(
-            "--format",
-            choices=formats,
-            help="form of the result on standard output; tables of rows are CSV into a pipe",
-        )
-    parser.add_argument(
-        "-q", "--quiet", action="store_true", help="print no remarks on standard error"
-    )
-    parser.add_argument(
-        "-v", "--verbose", action="store_true", help="print all details of the result"
-    )
-
-
 def declared_outputs(args: argparse.Namespace) -> list[Path]:
-    """The arguments that are declared by `add_output`, and the files of `--report`.
+    """The arguments that are declared as `OutputFile`, and the files of `--report`.
 
     A command whose outputs are others has a function `outputs` in the place of this one.
     """
     declared = [Path(value) for value in vars(args).values() if isinstance(value, OutputFile)]
     return declared + folder_outputs("--report", getattr(args, "report", None), REPORT_FILES)
-
-
-def add_model_and_runs(parser: argparse.ArgumentParser, *, need_runs: bool = True) -> None:
-    """Declare MODEL.toml and RUNS.csv."""
-    parser.add_argument(
-        "model", type=InputFile, metavar="MODEL.toml", help="gear, soil, priors and noise"
-    )
-    parser.add_argument(
-        "runs",
-        type=InputFile,
-        metavar="RUNS.csv",
-        nargs=None if need_runs else "?",
-        help="measured rows: CSV, Parquet or .xlsx",
-    )
-
-
-def add_exact_model_option(parser: argparse.ArgumentParser) -> None:
-    """Declare --exact-model."""
-    parser.add_argument(
-        "--exact-model",
-        action="store_true",
-        help="assume a perfect model, and sensors exactly as in MODEL.toml",
-    )
-
-
-def add_gravity_options(parser: argparse.ArgumentParser) -> None:
-    """Declare --gravity, --tested-at and --gravity-law, which `gravity_change` reads."""
-    parser.add_argument(
-        "--gravity",
-        metavar="G",
-        help="gravity that is predicted for: earth, moon, mars, or in m/s^2",
-    )
-    parser.add_argument(
-        "--tested-at",
-        metavar="G",
-        help="gravity of the rows (default: that of [rover], else earth)",
-    )
-    parser.add_argument(
-        "--gravity-law",
-        metavar="LAW",
-        help="how the soil changes with gravity: open (default), constant or proportional",
-    )
 
 
 def gravity_change(args: argparse.Namespace, case: Case) -> GravityChange | None:
@@ -152,32 +178,6 @@ def gravity_change(args: argparse.Namespace, case: Case) -> GravityChange | None
     if args.tested_at is not None:
         tested = read_gravity(args.tested_at)
     return GravityChange(tested, read_gravity(args.gravity), args.gravity_law or "open")
-
-
-def add_by_option(parser: argparse.ArgumentParser) -> None:
-    """Declare `--by`, which `tables.result_by_group` follows."""
-    parser.add_argument(
-        "--by", metavar="COLUMN", help="one result for each value of this column, such as run"
-    )
-
-
-def add_effects_option(parser: argparse.ArgumentParser) -> None:
-    """Declare `--effects`."""
-    parser.add_argument(
-        "--effects",
-        type=InputFile,
-        metavar="FILE.py",
-        help="Python file with effects of your own, which [[effect]] may then name; it is executed",
-    )
-
-
-def add_report_option(parser: argparse.ArgumentParser) -> None:
-    """Declare `--report`, whose files are `REPORT_FILES`."""
-    parser.add_argument(
-        "--report",
-        metavar="FOLDER",
-        help="folder for report.html, a page with picture, table and warnings, and report.json",
-    )
 
 
 def need_for_options(args: argparse.Namespace, command: str) -> None:
@@ -212,62 +212,6 @@ def input_files(args: argparse.Namespace) -> list[str]:
     """Every file that a command reads: the arguments that are declared as `InputFile`."""
     lists = (v if isinstance(v, list) else [v] for v in vars(args).values())
     return [value for values in lists for value in values if isinstance(value, InputFile)]
-
-
-def add_gear_option(parser: argparse.ArgumentParser) -> None:
-    """Declare `--gear`."""
-    parser.add_argument(
-        "--gear", metavar="NAME", help="which of the gears [gears.NAME], where MODEL.toml has some"
-    )
-
-
-def add_ignore_extra_option(parser: argparse.ArgumentParser) -> None:
-    """Declare `--ignore-extra`."""
-    parser.add_argument(
-        "--ignore-extra", action="store_true", help="ignore columns whose names are not known"
-    )
-
-
-def add_row_options(parser: argparse.ArgumentParser) -> None:
-    """Declare `--where`, `--gear` and `--ignore-extra`, which `tables.read_rows` follows."""
-    parser.add_argument("--where", metavar="COLUMN=VALUE", help="use only the rows with this value")
-    parser.add_argument(
-        "--gear",
-        metavar="NAME",
-        help="use only the rows of this gear, and [gears.NAME] where the model file has several",
-    )
-    add_ignore_extra_option(parser)
-
-
-def add_seed_option(parser: argparse.ArgumentParser) -> None:
-    """Declare `--seed`."""
-    parser.add_argument(
-        "--seed",
-        type=whole_number_from(0),
-        default=0,
-        help="seed of the random numbers (default: 0)",
-    )
-
-
-def add_cost_option(parser: argparse.ArgumentParser) -> None:
-    """Declare `--cost`, which `parse_costs` reads."""
-    parser.add_argument(
-        "--cost",
-        metavar="KIND=NUMBER",
-        action="append",
-        default=[],
-        help="cost of a kind of run to add, in any unit (default: 1); can be repeated",
-    )
-
-
-def add_workers_option(parser: argparse.ArgumentParser) -> None:
-    """Declare `--workers`."""
-    parser.add_argument(
-        "--workers",
-        type=whole_number_from(1),
-        metavar="N",
-        help="number of processes (default: one for each core)",
-    )
 
 
 def leaves(root: argparse.ArgumentParser, before: str = "") -> Iterator[tuple[str, Any]]:

@@ -14,7 +14,7 @@ from soilml.experiment_design.parameter_samples import (
     samples_of_prior,
     samples_of_rows,
 )
-from soilml.experiment_design.presentation import abstention_message, is_identified
+from soilml.experiment_design.presentation import is_identified
 
 __all__ = [
     "Advice",
@@ -22,7 +22,6 @@ __all__ = [
     "CandidateRow",
     "ParameterSamples",
     "RatedRow",
-    "abstention_message",
     "advise",
     "candidate_grid",
     "is_identified",

@@ -15,14 +15,12 @@ from soilml.errors import FitError, InputError
 from soilml.experiment_design.expected_variance import (
     OUTCOMES,
     ExpectedVariance,
-    PredictedReadings,
     expected_variance,
     predicted_readings,
 )
 from soilml.experiment_design.parameter_samples import ParameterSamples
 from soilml.fitting.levels import replicate_rows
 from soilml.physics.operating_point import MOST_SLIP, Operating
-from soilml.quantities import column
 from soilml.results import Result
 
 if TYPE_CHECKING:
@@ -36,6 +34,7 @@ LIGHTER, HEAVIER = 0.5, 2.0
 #: Most operating points whose repetition is rated.
 REPETITIONS = 6
 Floats32 = NDArray[np.float32]
+NO_ROWS = np.zeros((1, 1), np.float32)  # Log likelihood of no rows
 
 
 @dataclass(frozen=True)
@@ -99,11 +98,6 @@ def channel_sets(declared: Sequence[str]) -> list[tuple[str, ...]]:
         raise InputError("none of the measured channels has its noise declared in [noise]")
     first, *others = declared
     return [(first,), *[(first, other) for other in others]]
-
-
-def channel_label(channels: Sequence[str]) -> str:
-    """Column names: torque_Nm + sinkage_m."""
-    return " + ".join(column(name) for name in channels)
 
 
 def repeated_points(measured: Operating, channels: tuple[str, ...] = ()) -> list[CandidateRow]:
@@ -177,8 +171,7 @@ class Advice(Result):
 
     def best(self, name: str | None = None, channels: tuple[str, ...] | None = None) -> RatedRow:
         """The choice with the least remaining fraction of one parameter, or of all (`overall`)."""
-        choices = self.with_channels(channels or self.channel_sets[0])
-        return best_row(choices, self.names, name)
+        return best_row(self.with_channels(channels or self.channel_sets[0]), self.names, name)
 
     def best_repetition(self, name: str | None = None) -> RatedRow | None:
         """The best repetition of a measured operating point; None without measured rows."""
@@ -260,86 +253,55 @@ def advise(
     ----------
     Chaloner and Verdinelli, Statistical Science 10, 1995.
     """
-    rating = _rating(case, samples, grid, measured, covariates or {}, parameters, current_fraction)
-    predicted = rating.predicted.channels
-    sets = channel_sets([c for c in predicted if channels is None or c in channels])
-    outcomes = expected_variance(samples, len(predicted), outcome_count)
-    first = rating.rate(grid.candidates(sets[:1]), outcomes)
-    if not first:
-        raise FitError(
-            "at each of these slips and loads some soils that are still possible do not carry the "
-            "wheel: try smaller loads, or narrow [soil.prior]"
-        )
-    sequence, earlier = [best_row(first, rating.names, None)], None
-    for step in range(1, count):
-        log_likelihood = rating.log_likelihood(sequence[-1].candidate, outcomes)
-        earlier = log_likelihood if earlier is None else earlier + log_likelihood
-        outcomes = outcomes.with_noise(step)
-        after = rating.rate([c.candidate for c in first], outcomes, earlier)
-        sequence.append(best_row(after, rating.names, None))
-    outcomes = outcomes.with_noise(0)
-    repetitions = [] if measured is None else repeated_points(measured, sets[0])
-    return Advice(
-        names=rating.names,
-        current_fraction=rating.current_fraction,
-        choices=(*first, *rating.rate(grid.candidates(sets[1:]), outcomes)),
-        repetitions=tuple(rating.rate(repetitions, outcomes)),
-        sequence=tuple(sequence),
-        excluded_points=len(grid.slips) * len(grid.loads) - len(first),
-    )
-
-
-@dataclass(frozen=True)
-class _Rating:
-    """Predicted readings at all points, and the parameters that candidates are rated by."""
-
-    names: tuple[str, ...]
-    current_fraction: Floats
-    columns: list[int]  # of the rated parameters among those of the samples
-    scale: Floats  # current fraction over that of the samples
-    predicted: PredictedReadings
-    index: dict[tuple[float, float], int]  # of each slip and load among the points
-
-    def log_likelihood(self, row: CandidateRow, outcomes: ExpectedVariance) -> Floats32:
-        return outcomes.log_likelihood(self.predicted, row.channels, self.index[row.slip, row.load])
-
-    def rate(
-        self,
-        candidates: Sequence[CandidateRow],
-        outcomes: ExpectedVariance,
-        earlier: Floats32 | None = None,
-    ) -> list[RatedRow]:
-        """Candidates that can be driven, after rows with the log likelihood `earlier`."""
-        rated = []
-        for row in candidates:
-            if self.predicted.drivable[self.index[row.slip, row.load]]:
-                logs = self.log_likelihood(row, outcomes)
-                logs = logs if earlier is None else logs + earlier
-                variance = outcomes.remaining_variance(logs)[self.columns]
-                rated.append(RatedRow(row, self.scale * np.sqrt(variance)))
-        return rated
-
-
-def _rating(
-    case: Case,
-    samples: ParameterSamples,
-    grid: CandidateGrid,
-    measured: Operating | None,
-    covariates: Mapping[str, float],
-    parameters: Sequence[str] | None,
-    current_fraction: Floats | None,
-) -> _Rating:
-    """Predicted readings at all points of the grid and at measured ones."""
     points = [(c.slip, c.load) for c in grid.candidates([()])]
     if measured is not None:
         points += [(c.slip, c.load) for c in repeated_points(measured)]
     index = {point: k for k, point in enumerate(dict.fromkeys(points))}
     slip, load = np.asarray(list(index)).T
-    others = {key: np.full(len(index), value) for key, value in covariates.items()}
-    predicted = predicted_readings(case, samples, Operating(slip=slip, load=load, **others))
+    others = {key: np.full(len(index), value) for key, value in (covariates or {}).items()}
+    ahead = predicted_readings(case, samples, Operating(slip=slip, load=load, **others))
     paths = [f.path for f in samples.free]
     names = tuple(parameters or paths)
     columns = [paths.index(name) for name in names]
     sampled = samples.remaining_fraction[columns]
     current = sampled if current_fraction is None else current_fraction
-    return _Rating(names, current, columns, current / sampled, predicted, index)
+
+    def log_likelihood(row: CandidateRow, outcomes: ExpectedVariance) -> Floats32:
+        return outcomes.log_likelihood(ahead, row.channels, index[row.slip, row.load])
+
+    def rate(
+        candidates: Sequence[CandidateRow],
+        outcomes: ExpectedVariance,
+        earlier: Floats32 = NO_ROWS,
+    ) -> list[RatedRow]:
+        """Candidates that can be driven, after rows with the log likelihood `earlier`."""
+        rated = []
+        for row in candidates:
+            if ahead.drivable[index[row.slip, row.load]]:
+                left = outcomes.remaining_variance(log_likelihood(row, outcomes) + earlier)[columns]
+                rated.append(RatedRow(row, current / sampled * np.sqrt(left)))
+        return rated
+
+    sets = channel_sets([c for c in ahead.channels if channels is None or c in channels])
+    outcomes = expected_variance(samples, len(ahead.channels), outcome_count)
+    first = rate(grid.candidates(sets[:1]), outcomes)
+    if not first:
+        raise FitError(
+            "at each of these slips and loads some soils that are still possible do not carry the "
+            "wheel: try smaller loads, or narrow [soil.prior]"
+        )
+    sequence, earlier, own = [best_row(first, names, None)], NO_ROWS, outcomes
+    for step in range(1, count):
+        earlier = earlier + log_likelihood(sequence[-1].candidate, own)
+        own = outcomes.with_noise(step)
+        after = rate([c.candidate for c in first], own, earlier)
+        sequence.append(best_row(after, names, None))
+    repetitions = [] if measured is None else repeated_points(measured, sets[0])
+    return Advice(
+        names=names,
+        current_fraction=current,
+        choices=(*first, *rate(grid.candidates(sets[1:]), outcomes)),
+        repetitions=tuple(rate(repetitions, outcomes)),
+        sequence=tuple(sequence),
+        excluded_points=len(grid.slips) * len(grid.loads) - len(first),
+    )

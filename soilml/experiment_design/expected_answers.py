@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -9,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.config.case import Case
-from soilml.errors import FitError
+from soilml.config.case import Case, take_case
+from soilml.errors import FitError, SoilmlError
 from soilml.experiment_design.design import (
     Advice,
     CandidateGrid,
@@ -22,6 +23,7 @@ from soilml.experiment_design.design import (
 from soilml.experiment_design.expected_variance import predicted_readings
 from soilml.experiment_design.parameter_samples import samples_of_moments
 from soilml.fitting.coordinates import select_free
+from soilml.io.toml_settings import Settings
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS
 
@@ -33,6 +35,9 @@ if TYPE_CHECKING:
 OUTCOMES = 12
 #: Rows up to which each answer is that of all rows at once; of more rows it is a step of memory.
 RUN_ROWS = 32
+#: Tables and keys of a recipe that a case contains, or that concern the sampling of rows only.
+CASE_KEYS = {"gear", "soil", "effect", "noise", "discrepancy", "operating", "rows", "seed", "runs"}
+GRID_SIZE = 4  # Candidate slips, and loads, in the ranges of a recipe
 
 
 def advise_by_answers(
@@ -168,3 +173,21 @@ def _shares(rows: Mapping[str, Floats]) -> dict[str, float]:
         for name in rows
         if f"{name}_std" in rows
     }
+
+
+def trained_case(estimator: Estimator) -> tuple[Case, CandidateGrid] | None:
+    """Case and candidate grid of a file for one wheel; None where no case can represent it."""
+    read = {*estimator.inputs}
+    if estimator.per_row or not {"slip", "load"} < read <= {"slip", "load", *CHANNELS}:
+        return None
+    try:
+        recipe = json.loads(estimator.metadata["recipe"])
+        if recipe.keys() - CASE_KEYS or recipe["operating"].keys() - {"slip", "load_N"}:
+            return None
+        case = take_case(Settings(recipe, estimator.path))
+        ends = [recipe["operating"][key] for key in ("slip", "load_N")]
+        pairs = [entry["range"] if isinstance(entry, dict) else entry for entry in ends]
+        slips, loads = ([float(x) for x in np.linspace(a, b, GRID_SIZE)] for a, b in pairs)
+        return case, CandidateGrid(tuple(slips), tuple(loads))
+    except (SoilmlError, AttributeError, KeyError, TypeError, ValueError):
+        return None

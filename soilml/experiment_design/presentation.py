@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.experiment_design.design import Advice, RatedRow, channel_label
+from soilml.experiment_design.design import Advice, RatedRow
 from soilml.physics.operating_point import Operating
-from soilml.quantities import NOT_IDENTIFIED_ABOVE
+from soilml.quantities import NOT_IDENTIFIED_ABOVE, column
 from soilml.remarks import NEXT_ROW, Remark
 from soilml.report.numbers import parameter_name, share_left
 from soilml.report.report import Picture, Report
@@ -29,29 +29,19 @@ def is_identified(remaining_fraction: Floats) -> NDArray[np.bool_]:
     return np.asarray(remaining_fraction <= NOT_IDENTIFIED_ABOVE)
 
 
-def abstention_message(name: str, remaining_fraction: float, rows: str = "these rows") -> str:
-    """That a parameter is not identified; `rows` is "these rows" or "this row"."""
-    name = name.replace("_", " ")
-    left = share_left(remaining_fraction)
-    return f"{name}: not identified by {rows}, {left} the prior's width remains"
-
-
 def next_row_remarks(advice: Advice, rows: str = "these rows") -> list[Remark]:
     """A remark on each parameter that is not identified, and one on the best row for all.
 
-    `rows` as for `abstention_message`.
+    `rows` is "these rows" or "this row".
     """
-    current = advice.current_fraction
-    remarks = [
-        Remark(
-            NEXT_ROW,
-            f"{abstention_message(name, fraction, rows)}. {_most_informative(advice, name)}",
-            (name,),
-            "note",
-        )
-        for name, fraction, ok in zip(advice.names, current, is_identified(current), strict=True)
-        if not ok
-    ]
+    remarks = []
+    for name, fraction in zip(advice.names, advice.current_fraction.tolist(), strict=True):
+        if fraction > NOT_IDENTIFIED_ABOVE:
+            text = (
+                f"{name.replace('_', ' ')}: not identified by {rows}, {share_left(fraction)} the "
+            )
+            text += f"prior's width remains. {_most_informative(advice, name)}"
+            remarks.append(Remark(NEXT_ROW, text, (name,), "note"))
     best = f"best next row for all parameters: {row_message(advice, advice.best())}"
     return [*remarks, Remark(NEXT_ROW, best, advice.names, "note")]
 
@@ -68,42 +58,29 @@ def _most_informative(advice: Advice, name: str) -> str:
     i = advice.names.index(name)
     best = advice.best(name)
     fraction = float(best.remaining_fraction[i])
-    if fraction > advice.current_fraction[i] - NEGLIGIBLE:
-        return f"No single row identifies it: {_sequence(advice, i)}"
-    text = f"Most informative next: {best.candidate.description} (leaves {fraction:.0%})"
-    others = [
-        (channels, float(advice.best(name, channels).remaining_fraction[i]))
-        for channels in advice.channel_sets[1:]
-    ]
-    better = [(channels, other) for channels, other in others if other < fraction - NEGLIGIBLE]
-    if better:
-        channels, other = min(better, key=lambda pair: pair[1])
-        text += f", with {channels[1].replace('_', ' ')} {other:.0%}"
-    repetition = advice.best_repetition(name)
-    if repetition is not None:
-        text += f"; a repetition leaves {repetition.remaining_fraction[i]:.0%}"
-    return text if is_identified(np.asarray(fraction)) else f"{text}; {_sequence(advice, i)}"
-
-
-def _sequence(advice: Advice, i: int) -> str:
-    """What remains of parameter `i` after several rows."""
-    if len(advice.sequence) < 2:
-        return "several rows at other slips and loads may"
     rows = ", then ".join(c.candidate.description for c in advice.sequence)
-    fraction = advice.sequence[-1].remaining_fraction[i]
-    return f"{len(advice.sequence)} rows leave {fraction:.0%}: {rows}"
+    several = f"{len(advice.sequence)} rows leave "
+    several += f"{advice.sequence[-1].remaining_fraction[i]:.0%}: {rows}"
+    if len(advice.sequence) < 2:
+        several = "several rows at other slips and loads may"
+    if fraction > advice.current_fraction[i] - NEGLIGIBLE:
+        return f"No single row identifies it: {several}"
+    text = f"Most informative next: {best.candidate.description} (leaves {fraction:.0%})"
+    others = {c: float(advice.best(name, c).remaining_fraction[i]) for c in advice.channel_sets[1:]}
+    if others and (other := min(others.values())) < fraction - NEGLIGIBLE:
+        channels = min(others, key=lambda c: others[c])
+        text += f", with {channels[1].replace('_', ' ')} {other:.0%}"
+    if (repetition := advice.best_repetition(name)) is not None:
+        text += f"; a repetition leaves {repetition.remaining_fraction[i]:.0%}"
+    return text if fraction <= NOT_IDENTIFIED_ABOVE else f"{text}; {several}"
 
 
 def _row_as_json(advice: Advice, choice: RatedRow) -> dict[str, object]:
     """A row, and the fraction of each prior expected to remain after it."""
-    c = choice.candidate
-    return {
-        "slip": c.slip,
-        "load_N": c.load,
-        "channels": list(c.channels),
-        "remaining_fraction": dict(
-            zip(advice.names, choice.remaining_fraction.tolist(), strict=True)
-        ),
+    row, left = choice.candidate, choice.remaining_fraction.tolist()
+    fractions = dict(zip(advice.names, left, strict=True))
+    return {"slip": row.slip, "load_N": row.load, "channels": list(row.channels)} | {
+        "remaining_fraction": fractions
     }
 
 
@@ -155,11 +132,6 @@ def _draw_maps(advice: Advice, measured: Operating | None, axes: Any) -> None:
         panel.set_ylabel("load of the next row, N")
 
 
-def advice_verdict(advice: Advice) -> str:
-    """The best next row, and what it leaves of each prior."""
-    return f"Measure next: {row_message(advice, advice.best())}."
-
-
 def report_of_advice(
     advice: Advice, measured: Operating | None = None, remarks: Sequence[Remark] = ()
 ) -> Report:
@@ -172,19 +144,19 @@ def report_of_advice(
         elif name != "channels":
             unit = "N" if name == "load_N" else "1"
             columns.append(Column(name.removesuffix("_N"), list(values), unit, digits=3))
-    count = len(advice.names)
+    verdict, count = f"Measure next: {row_message(advice, advice.best())}.", len(advice.names)
     vague = advice.names if measured is None else [
         n for n, ok in zip(advice.names, is_identified(advice.current_fraction), strict=True)
         if not ok
     ]  # fmt: skip
     return Report(
         kind="plan",
-        verdict=advice_verdict(advice),
+        verdict=verdict,
         tables=[ReportTable("Rows to measure next", columns, "Width that is left of each prior.")],
         pictures=[
             Picture(
                 "Next rows", partial(_draw_maps, advice, measured), 1, count, (3.8 * count, 3.6),
-                advice_verdict(advice),
+                verdict,
                 "Expected width, in percent of the prior's, after a row at this slip and load. "
                 "Frame: the best row. Rings: measured rows. Blank: the soil might not carry it.",
             )
@@ -217,7 +189,7 @@ def advice_columns(advice: Advice, rows: Sequence[tuple[str, RatedRow]]) -> dict
     choices = [choice for _, choice in rows]
     columns: dict[str, Any] = {
         "row": [why.replace("_", " ") for why, _ in rows],
-        "channels": [channel_label(c.candidate.channels) for c in choices],
+        "channels": [" + ".join(map(column, c.candidate.channels)) for c in choices],
         "slip": np.asarray([c.candidate.slip for c in choices]),
         "load_N": np.asarray([c.candidate.load for c in choices]),
     }

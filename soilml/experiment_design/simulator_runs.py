@@ -209,8 +209,8 @@ def _commanded(simulator: Simulator, design: Mapping[str, Floats]) -> Mapping[st
 
 def emulator_lines(table: Table, gear: EmulatedGear, error: Floats) -> list[tuple[str, ...]]:
     """Channel, error of the emulator, and that as a share of the spread of the runs, in %."""
-    rows: list[tuple[str, ...]] = []
-    for name, own in zip(gear.channels, error, strict=True):
-        share = 100.0 * own / max(float(np.std(table[column(name)])), 1e-300)
-        rows.append((column(name), f"{own:.3g}", f"{share:.2g}"))
-    return rows
+    spread = [max(float(np.std(table[column(name)])), 1e-300) for name in gear.channels]
+    return [
+        (column(name), f"{own:.3g}", f"{100.0 * own / all_:.2g}")
+        for name, own, all_ in zip(gear.channels, error, spread, strict=True)
+    ]

@@ -41,28 +41,19 @@ class TransferTest:
 
 @dataclass(frozen=True)
 class TransferAdvice:
-    """Tests rated by what they tell of a wheel's pull under another gravity.
-
-    change, load, slip: Of the pull that is asked for; load in N.
-    tests: Those that are carried. `same_load` and `same_mass` have the case's own radius, or are
-        None where they are not carried.
-    pull, known_std: Its mean and standard deviation before any test, N.
-    least_std, least_width: Standard deviation and mean width of the 90 % band with the soil known
-        and the law not, N: no test leaves less.
-    excluded: Number of tests that a twentieth of the soils or more does not carry.
-    """
+    """Tests rated by what they tell of a wheel's pull under another gravity."""
 
     change: GravityChange
-    load: float
+    load: float  # of the pull that is asked for, N
     slip: float
-    tests: tuple[TransferTest, ...]
-    same_load: TransferTest | None
+    tests: tuple[TransferTest, ...]  # that are carried
+    same_load: TransferTest | None  # with the case's own radius; None where it is not carried
     same_mass: TransferTest | None
-    pull: float
-    known_std: float
-    least_std: float
-    least_width: float
-    excluded: int
+    pull: float  # mean before any test, N
+    known_std: float  # standard deviation before any test, N
+    least_std: float  # with the soil known and the law not, N: no test leaves less
+    least_width: float  # mean width of the 90 % band likewise, N
+    excluded: int  # tests that a twentieth of the soils or more does not carry
 
     @property
     def best(self) -> TransferTest:

@@ -11,9 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.errors import InputError
+from soilml.errors import InputError, raised
 from soilml.fitting.coordinates import Coordinate
-from soilml.fitting.least_squares import LeastSquaresProblem, SoilTestTerms, Solution
+from soilml.fitting.least_squares import (
+    LeastSquaresProblem,
+    PriorTerms,
+    SoilTestTerms,
+    Solution,
+)
 from soilml.fitting.predictions import (
     Linearisation,
     PredictionRequest,
@@ -24,7 +29,7 @@ from soilml.fitting.predictions import (
 T = TypeVar("T")
 
 #: Iterations after which a descent is abandoned as not converged; typical fits need five to ten.
-MAX_ITERATIONS = 25
+MAX_ITERATIONS = 50
 #: A step that achieves this fraction of what the linearised model promises is followed by one step
 #: alone, and else by a choice of several. Where none of these does, they are corrected too.
 KEPT_PROMISE = 0.5
@@ -59,6 +64,9 @@ class Tolerance:
 
 #: For estimates: far below the thresholds on differences of the objective, which start at 9.
 FINE = Tolerance(enough=0.01, share=5e-4, step_share=2e-3, iterations=4, creeping=0.15)
+#: For the least squares of `identify`, and for its descents that only tell optima apart.
+EXACT = Tolerance(enough=1e-9, share=0.0, step_share=0.0, iterations=50, creeping=0.0)
+APART = Tolerance(enough=1e-4, share=1e-5, step_share=1e-5, iterations=50, creeping=0.0)
 #: For fits that are compared first, of which those near the best go on to the fine one.
 COARSE = Tolerance(enough=0.5, share=0.01, step_share=0.01, iterations=3, creeping=1.0)
 
@@ -71,14 +79,14 @@ class DampedSteps:
     precision (p,): Precision of each coordinate's normal density about zero, or 0.
     offset (p,): What is added to a coordinate to obtain a multiple of the parameter, where the
         parameter moves by ratios; infinite where it moves by differences.
-    tests: Tests of the soil, which stand beside the residuals.
+    terms: Tests of the soil and priors, which stand beside the residuals.
     """
 
     lower: Floats
     upper: Floats
     precision: Floats
     offset: Floats
-    tests: SoilTestTerms = field(default_factory=SoilTestTerms)
+    terms: SoilTestTerms | PriorTerms = field(default_factory=SoilTestTerms)
 
     @staticmethod
     def of(problem: LeastSquaresProblem) -> DampedSteps:
@@ -89,7 +97,7 @@ class DampedSteps:
             upper=problem.upper,
             precision=problem.precision,
             offset=offset,
-            tests=problem.soil_tests,
+            terms=problem.terms,
         )
 
     def within(self, x: Floats) -> Floats:
@@ -136,7 +144,8 @@ class DampedSteps:
 
     def _descent(self, x: Floats, of_readings: Floats) -> Floats:
         """Half the negative gradient (b, p) at points (b, p), from that of the readings."""
-        return of_readings - self.precision * x - self._of_tests(x)
+        of_terms = [self.terms.rates(one).T @ self.terms.deviation(one) for one in x]
+        return of_readings - self.precision * x - np.stack(of_terms)
 
     def _steps(self, x: Floats, descent: Floats, normal: Floats, damping: Floats) -> Floats:
         """Damped steps (b, p) from points (b, p).
@@ -161,17 +170,8 @@ class DampedSteps:
 
         gram (p, p): That of the readings.
         """
-        normal = np.tile(gram + np.diag(self.precision), (len(x), 1, 1))
-        if self.tests.case is not None and self.tests.case.soil_tests:
-            rates = np.stack([self.tests.rates(one) for one in x])
-            normal += rates.swapaxes(1, 2) @ rates
-        return normal
-
-    def _of_tests(self, x: Floats) -> Floats | float:
-        """Half the gradient of what the tests of the soil contribute, at points (b, p)."""
-        if self.tests.case is None or not self.tests.case.soil_tests:
-            return 0.0
-        return np.stack([self.tests.rates(one).T @ self.tests.deviation(one) for one in x])
+        rates = np.stack([self.terms.rates(one) for one in x])
+        return np.asarray(gram + np.diag(self.precision) + rates.swapaxes(1, 2) @ rates)
 
     def moved(self, x: Floats, step: Floats) -> Floats:
         """Coordinates (..., p) after steps: those that move by ratios follow an exponential."""
@@ -237,15 +237,20 @@ def _offset(coordinate: Coordinate) -> float:
     return prior.lower / (prior.upper - prior.lower)
 
 
-def levenberg_marquardt(problem: LeastSquaresProblem, start: Floats) -> Solution:
+def descend(
+    problem: LeastSquaresProblem,
+    start: Floats,
+    tolerance: Tolerance = FINE,
+    near: Linearisation | None = None,
+) -> Solution:
     """Bounded Levenberg-Marquardt descent from one start (p,); see `descend_together`.
+
+    near: A linearisation that saves the search for equilibrium, where it is at the start.
 
     Raises `InputError` where the model refuses the coordinates of a trial.
     """
-    (fit,) = descend_together([problem], [start])
-    if isinstance(fit, InputError):
-        raise fit
-    return fit
+    (fit,) = in_step([descent(problem, start, near, tolerance)])
+    return raised(fit)
 
 
 def descend_together(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate, rates_at
+from soilml.fitting.least_squares import Solution
 from soilml.fitting.levels import load_levels
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
@@ -78,6 +79,20 @@ class FittedReadings:
         for k in range(len(readings.channels)):
             own = (readings.channel == k) & ~np.isfinite(std)
             std[own] = np.sqrt(np.nanmean(residual[own] ** 2)) if own.any() else 1.0
+        return FittedReadings._of(readings, std, found.prediction, variance)
+
+    @staticmethod
+    def of_solutions(before: Solution, after: Solution, std: Floats) -> FittedReadings:
+        """Readings with the predictions of two fits; `std` (m,) is their noise."""
+        readings, jacobian = after.problem.readings, after.derivatives
+        variance = np.einsum("ij,jk,ik->i", jacobian, after.covariance, jacobian)
+        found = FittedReadings._of(readings, std, after.prediction, variance)
+        return replace(found, before=before.prediction)
+
+    @staticmethod
+    def _of(
+        readings: Readings, std: Floats, prediction: Floats, variance: Floats
+    ) -> FittedReadings:
         return FittedReadings(
             channels=tuple(map(column, readings.channels)),
             channel=readings.channel,
@@ -86,7 +101,7 @@ class FittedReadings:
             load=readings.load,
             measured=readings.measured,
             std=std,
-            after=found.prediction,
+            after=prediction,
             after_std=np.sqrt(np.maximum(variance, 0.0)),
         )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -59,21 +60,43 @@ class SoilTestTerms:
 
 
 @dataclass(frozen=True)
+class PriorTerms:
+    """Deviations from tests of the soil, and from the priors of all coordinates, of unit variance.
+
+    A uniform prior counts as the Gaussian one of its variance about its middle, if at all.
+    """
+
+    tests: SoilTestTerms
+    normal_std: Floats  # (p,) of normal priors about zero; infinite where uniform
+    uniform_root: Floats  # (p,) root of the precision of uniform ones
+
+    def deviation(self, x: Floats) -> Floats:
+        """Deviations (..., t + p) at coordinates x (..., p)."""
+        own = values_at(self.tests.coordinates, x) / self.normal_std + self.uniform_root * (x - 0.5)
+        return np.concatenate([self.tests.deviation(x), own], axis=-1)
+
+    def rates(self, x: Floats) -> Floats:
+        """Derivatives (t + p, p) of the deviations at coordinates x (p,)."""
+        own = rates_at(self.tests.coordinates, x) / self.normal_std + self.uniform_root
+        return np.vstack([self.tests.rates(x), np.diag(own)])
+
+
+@dataclass(frozen=True)
 class LeastSquaresProblem:
     r"""Readings y with covariance, and the case that is fitted to them.
 
     .. math:: \min_x \|W (y - f(x))\|^2 + \sum_k (\theta_k(x) / \sigma_k)^2 + \sum_i z_i(x)^2
 
-    with the whitening W, normal densities of parameters about zero, and the deviations z from
-    tests of the soil. `damped_descents`, which `gap` takes, minimises this sum. `scipy_descents`,
-    which `identify` takes, adds the normal priors of soil parameters to it (`cost_with_priors`);
-    for `gap` these are uniform in the coordinate.
+    with the whitening W, normal densities of sizes of effects about zero, and the deviations z from
+    tests of the soil. `priors` adds those of the soil parameters: of normal priors, or of all as
+    Gaussian ones. For `gap` all are uniform in the coordinate.
     """
 
     case: Case
     coordinates: Sequence[Coordinate]
     readings: Readings
     whiten: Whitening | Floats  # (m, m) in either form, or (k, m) of some of the readings
+    priors: Literal["", "normal", "all"] = ""
 
     @cached_property
     def gears(self) -> list[GearReadings]:
@@ -125,20 +148,23 @@ class LeastSquaresProblem:
 
     @cached_property
     def normal_std(self) -> Floats:
-        """Standard deviation of each normal prior or density, (p,); infinite where uniform."""
-        stds = [c.normal_std or c.prior.normal_std or np.inf for c in self.coordinates]
-        return np.asarray(stds)
+        """Standard deviation of each normal prior, (p,); infinite where uniform."""
+        return np.asarray([c.prior.normal_std or np.inf for c in self.coordinates])
 
-    def normal_deviation(self, x: Floats) -> tuple[Floats, Floats]:
-        """Values over the standard deviations of normal priors, and their derivatives by x (p,)."""
-        values, rates = values_at(self.coordinates, x), rates_at(self.coordinates, x)
-        return values / self.normal_std, rates / self.normal_std
+    @cached_property
+    def terms(self) -> SoilTestTerms | PriorTerms:
+        """Deviations that stand beside the residuals."""
+        if not self.priors:
+            return self.soil_tests
+        precision = UNIFORM_PRECISION if self.priors == "all" else 0.0
+        root = np.where(np.isinf(self.normal_std), np.sqrt(precision), 0.0)
+        return PriorTerms(self.soil_tests, self.normal_std, root)
 
     def objective(self, residual: Floats, x: Floats) -> Floats:
         """What is minimised, at whitened residuals (..., m) and coordinates (..., p)."""
         of_prior = (x**2 * self.precision).sum(axis=-1)
-        of_tests = (self.soil_tests.deviation(x) ** 2).sum(axis=-1)
-        return np.asarray((residual**2).sum(axis=-1) + of_prior + of_tests)
+        of_terms = (self.terms.deviation(x) ** 2).sum(axis=-1)
+        return np.asarray((residual**2).sum(axis=-1) + of_prior + of_terms)
 
     def at(self, x: Floats, linearisation: Linearisation) -> Solution:
         """The problem at x (p,), from a linearisation there."""
@@ -202,13 +228,6 @@ class Solution:
     def cost(self) -> float:
         """Sum of the squared whitened residuals."""
         return float(self.residual @ self.residual)
-
-    @property
-    def cost_with_priors(self) -> float:
-        """Cost with the deviations from normal priors and from tests of the soil."""
-        of_prior = self.problem.normal_deviation(self.x)[0]
-        of_tests = self.soil_tests.deviation(self.x)
-        return self.cost + float(of_prior @ of_prior) + float(of_tests @ of_tests)
 
     @property
     def precision(self) -> Floats:

@@ -19,11 +19,11 @@ from soilml.fitting.covariance import (
     discrepancy_process,
     noise_of_operation,
 )
-from soilml.fitting.damped_descents import levenberg_marquardt
+from soilml.fitting.damped_descents import EXACT, FINE, descend
 from soilml.fitting.error_columns import error_columns, stacked
+from soilml.fitting.global_optimum import global_optimum
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.readings import Readings
-from soilml.fitting.scipy_descents import descend, global_optimum
 from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.numerics.smooth_process import LEAST_EIGENVALUE
 from soilml.remarks import Remark
@@ -74,7 +74,7 @@ class WeightedRows:
     def problem(self) -> LeastSquaresProblem:
         """The problem, weighted by noise, model discrepancy and shared errors."""
         whiten = Whitening.of(self.readings.std, self.columns)
-        return LeastSquaresProblem(self.case, self.free, self.readings, whiten)
+        return LeastSquaresProblem(self.case, self.free, self.readings, whiten, "normal")
 
     def with_noise_at(self, optimum: Solution) -> WeightedRows:
         """The same with noise and shared errors at an optimum, or noise from its residuals."""
@@ -192,10 +192,10 @@ def fit_under_declared_noise(
     if start is None:
         optimum = global_optimum(weighted.problem)
     else:
-        optimum = levenberg_marquardt(weighted.problem, start)
+        optimum = descend(weighted.problem, start, FINE)
     for _ in range(NOISE_ROUNDS if readings.undeclared or readings.shared_errors else 1):
         weighted = weighted.with_noise_at(optimum)
-        optimum = descend(weighted.problem, optimum.x, near=optimum.linearisation)
+        optimum = descend(weighted.problem, optimum.x, EXACT, optimum.linearisation)
     return weighted, optimum
 
 

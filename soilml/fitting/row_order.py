@@ -43,7 +43,11 @@ def with_order_columns(case: Case, table: Table, fields: Collection[str] | None 
     timed = _has_times(table)
     if not (timed or _runs_stand_together(table)):
         return table
-    if "progress" in wanted and runs != 2 and (timed or not _is_sorted(table, progress)):
+    if (
+        "progress" in wanted
+        and runs != 2
+        and (timed or share_by_driving(progress, table["slip"], table["load_N"]) <= MOST_EXPLAINED)
+    ):
         columns[FROM_ORDER["progress"]] = progress
     if "load_direction" in wanted and not is_one_load(table["load_N"]):
         order = np.argsort(progress, kind="stable")
@@ -85,16 +89,18 @@ def _runs_stand_together(table: Table) -> bool:
     return changes == np.unique(table["run"]).size - 1
 
 
-def _is_sorted(table: Table, progress: Floats) -> bool:
-    """Whether slip and load nearly follow from the order of the rows."""
-    slip, load = table["slip"], np.log(table["load_N"])
+def share_by_driving(order: Floats, slip: Floats, load: Floats) -> float:
+    """Share of the variance of an order (n,) of rows that polynomials of slip and log load have.
+
+    One where there are too few rows to tell.
+    """
     powers = [(i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)]
-    columns = np.stack([slip**i * load**j for i, j in powers], axis=1)
-    fit, _, rank, _ = np.linalg.lstsq(columns, progress, rcond=None)
-    if len(progress) <= 2 * rank:
-        return True
-    left = float(np.var(progress - columns @ fit))
-    return left < (1.0 - MOST_EXPLAINED) * float(np.var(progress))
+    columns = np.stack([slip**i * np.log(load) ** j for i, j in powers], axis=1)
+    fit, _, rank, _ = np.linalg.lstsq(columns, order, rcond=None)
+    variance = float(np.var(order))
+    if len(order) <= 2 * rank or variance == 0.0:
+        return 1.0
+    return 1.0 - float(np.var(order - columns @ fit)) / variance
 
 
 def load_directions(load: Floats) -> Floats:

@@ -8,8 +8,8 @@ the function: `from soilml import gap` gives either of them, depending on what w
 import sys
 from types import ModuleType
 
-from soilml.gap.design.identifiability import Audit, audit
-from soilml.gap.report.results import STATUSES, GapReport
+from soilml.gap.identifiability import Audit, audit
+from soilml.gap.results import STATUSES, GapReport
 from soilml.gap.workflow import gap
 
 __all__ = ["STATUSES", "Audit", "GapReport", "audit", "gap"]

@@ -1,18 +1,12 @@
-"""Data checks before an analysis: which data can be analysed, and which can identify a cause.
-
-A new check is a function from `CheckedData` to findings, listed in `CHECKS`.
-"""
+"""Data checks before an analysis: which data can be analysed, and which can identify a cause."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from enum import Enum
+from collections.abc import Iterator
 
 import numpy as np
 
 from soilml.fitting.readings import LEAST_RELATIVE_STD, Readings
-from soilml.io.table import Table
 from soilml.quantities import column
 from soilml.remarks import Remark
 
@@ -25,138 +19,73 @@ MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS = 4, 8
 ONE_LOAD = "one-load"  # Code of the obstacle that one load cannot test the soil parameters
 
 
-@dataclass(frozen=True)
-class DataCheckResult:
-    """Errors that prevent an analysis, obstacles to naming a cause, and notes."""
-
-    errors: tuple[Remark, ...] = ()
-    naming_obstacles: tuple[Remark, ...] = ()
-    notes: tuple[Remark, ...] = ()
-
-
-@dataclass(frozen=True)
-class CheckedData:
-    """What the checks look at; `parameters` is the number of free soil parameters."""
-
-    readings: Readings
-    rows: int
-    parameters: int
-
-
-class Consequence(Enum):
-    """Consequence of a finding."""
-
-    ERROR = "no analysis"
-    NAMING_OBSTACLE = "no cause can be named"
-    NOTE = "for information"
-
-
-Finding = tuple[Consequence, Remark]
-
-
-def check_readings(readings: Readings, table: Table, parameters: int) -> DataCheckResult:
-    """Run all data checks; `parameters` is the number of free soil parameters."""
-    data = CheckedData(readings, len(table), parameters)
-    findings = [finding for check in CHECKS for finding in check(data)]
-    errors, obstacles, notes = (
-        tuple(remark for consequence, remark in findings if consequence is wanted)
-        for wanted in Consequence
-    )
-    return DataCheckResult(errors, obstacles, notes)
-
-
-def _check_channels(data: CheckedData) -> Iterator[Finding]:
-    readings = data.readings
+def faults_of(readings: Readings, parameters: int) -> Iterator[Remark]:
+    """Why readings cannot be analysed; `parameters` is the number of free soil parameters."""
     for i, name in enumerate(readings.channels):
-        in_channel, key = readings.channel == i, column(name)
-        if not np.isfinite(readings.std[in_channel]).all():
+        own, key = readings.channel == i, column(name)
+        values, std = readings.measured[own], readings.std[own]
+        if not np.isfinite(std).all():
             text = (
                 f"the noise of {key} is not declared and there are no repeated rows to estimate "
                 f'it from: give [noise] {key}, as in {key} = "2 %", or a column {key}_std'
             )
-            yield Consequence.ERROR, Remark("noise-undeclared", text, (key,))
-        values = readings.measured[in_channel]
-        largest = float(np.abs(values).max(initial=0.0))
-        std = float(np.nanmax(readings.std[in_channel], initial=0.0))
-        if 0.0 < std <= LEAST_RELATIVE_STD * largest:
+            yield Remark("noise-undeclared", text, (key,))
+        largest, most = float(np.abs(values).max(initial=0.0)), float(np.nanmax(std, initial=0.0))
+        if 0.0 < most <= LEAST_RELATIVE_STD * largest:
             text = (
-                f"the noise of {key} is {std:.3g} or less, its largest reading {largest:.3g}: no "
+                f"the noise of {key} is {most:.3g} or less, its largest reading {largest:.3g}: no "
                 "sensor resolves so much; declare one such as '2 % + 0.05'"
             )
-            yield Consequence.ERROR, Remark("noise-too-small", text, (key,))
+            yield Remark("noise-too-small", text, (key,))
         if values.size > 3 and np.ptp(values) == 0.0:
             text = f"{key} is the same in every row: check the sensor"
-            yield Consequence.ERROR, Remark("constant-channel", text, (key,))
+            yield Remark("constant-channel", text, (key,))
+    if not readings.channels:
+        yield Remark("no-channel", "no torque, drawbar pull or sinkage was measured")
+    elif len(readings) < parameters + MIN_RESIDUAL_READINGS:
+        yield _few_readings(readings, parameters, MIN_RESIDUAL_READINGS, "")
 
 
-def _check_count(data: CheckedData) -> Iterator[Finding]:
-    count = len(data.readings)
-    if not data.readings.channels:
-        text = "no torque, drawbar pull or sinkage was measured"
-        yield Consequence.ERROR, Remark("no-channel", text)
-        return
-    for least, consequence, what in (
-        (MIN_RESIDUAL_READINGS, Consequence.ERROR, "are needed"),
-        (NAMING_RESIDUAL_READINGS, Consequence.NAMING_OBSTACLE, "are needed to name a cause"),
-    ):
-        if count < data.parameters + least:
-            text = (
-                f"{'1 reading' if count == 1 else f'{count} readings'} for {data.parameters} soil "
-                f"parameters: at least {data.parameters + least} readings {what}"
-            )
-            yield consequence, Remark("few-readings", text)
-            return
-
-
-def _check_variety(data: CheckedData) -> Iterator[Finding]:
-    readings = data.readings
+def naming_obstacles(readings: Readings, parameters: int) -> Iterator[Remark]:
+    """Why readings that can be analysed cannot identify a cause."""
+    if len(readings) < parameters + NAMING_RESIDUAL_READINGS:
+        yield _few_readings(readings, parameters, NAMING_RESIDUAL_READINGS, " to name a cause")
     if len(readings.runs) < 2:
         text = "one run only: run-to-run variation of the soil cannot be separated from a gap"
-        yield Consequence.NAMING_OBSTACLE, Remark("one-run", text)
-    if not readings.channels:
-        return
+        yield Remark("one-run", text)
     if readings.load_levels.count < 2:
-        text = "one load only: soil parameters and effects are confounded"
-        yield Consequence.NAMING_OBSTACLE, Remark(ONE_LOAD, text)
+        yield Remark(ONE_LOAD, "one load only: soil parameters and effects are confounded")
     if readings.slip_levels.count < 3:
         text = "fewer than three slips: effects that vary with slip cannot be distinguished"
-        yield Consequence.NAMING_OBSTACLE, Remark("few-slips", text)
+        yield Remark("few-slips", text)
 
 
-#: All data checks, in the order in which their findings are reported.
-CHECKS: tuple[Callable[[CheckedData], Iterator[Finding]], ...] = (
-    _check_channels,
-    _check_count,
-    _check_variety,
-)
+def _few_readings(readings: Readings, parameters: int, least: int, what: str) -> Remark:
+    count = "1 reading" if len(readings) == 1 else f"{len(readings)} readings"
+    text = f"{count} for {parameters} soil parameters: at least {parameters + least} readings are "
+    return Remark("few-readings", f"{text}needed{what}")
 
 
 def estimate_repeat_noise(readings: Readings) -> tuple[dict[str, float], list[Remark]]:
     """Noise of the channels without declared noise, from repeated rows, and notes about it."""
     noise, notes = {}, []
     for i, name in enumerate(readings.channels):
-        undeclared = np.flatnonzero((readings.channel == i) & ~np.isfinite(readings.std))
-        if undeclared.size == 0:
+        own = np.flatnonzero((readings.channel == i) & ~np.isfinite(readings.std))
+        if not own.size:
             continue
-        _, group = np.unique(readings.replicates[undeclared], return_inverse=True)
+        values, key = readings.measured[own], column(name)
+        _, group = np.unique(readings.replicates[own], return_inverse=True)
         count = np.bincount(group)
-        mean = np.bincount(group, readings.measured[undeclared]) / count
-        degrees_of_freedom = int((count - 1).sum())
-        if degrees_of_freedom < MIN_REPEAT_DEGREES_OF_FREEDOM:
+        freedom = int((count - 1).sum())
+        if freedom < MIN_REPEAT_DEGREES_OF_FREEDOM:
             continue
-        squares = float(np.sum((readings.measured[undeclared] - mean[group]) ** 2))
-        std = float(np.sqrt(squares / degrees_of_freedom))
-        if std <= LEAST_RELATIVE_STD * float(np.abs(readings.measured[undeclared]).max()):
-            text = (
-                f"noise of {column(name)} is not declared, and its repeated rows are equal: none "
-                "can be estimated from them"
-            )
-            notes.append(Remark("repeats-equal", text, (column(name),)))
+        squares = float(np.sum((values - (np.bincount(group, values) / count)[group]) ** 2))
+        std, begin = float(np.sqrt(squares / freedom)), f"noise of {key} is not declared"
+        if std <= LEAST_RELATIVE_STD * float(np.abs(values).max()):
+            text = f"{begin}, and its repeated rows are equal: none can be estimated from them"
+            notes.append(Remark("repeats-equal", text, (key,)))
             continue
         noise[name] = std
-        text = (
-            f"noise of {column(name)} is not declared: {noise[name]:.3g} was estimated from "
-            "repeated rows"
-        )
-        notes.append(Remark("noise-estimated", text, (column(name),), "note"))
+        text = f"{begin}: {std:.3g} was estimated from repeated rows"
+        notes.append(Remark("noise-estimated", text, (key,), "note"))
     return noise, notes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,69 +15,55 @@ from soilml.errors import InputError, solvable
 from soilml.fitting.candidate_effects import candidate_effects, effect_names
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
 from soilml.fitting.faulty_readings import sound_rows
+from soilml.fitting.fitted_readings import FittedReadings
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.fitting.predictions import forces
 from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.row_order import with_order_columns
 from soilml.fitting.usable_readings import answered_rows, with_zeros_replaced
-from soilml.gap.checks import DataCheckResult, check_readings, estimate_repeat_noise
-from soilml.gap.design.discriminating_runs import next_runs
-from soilml.gap.design.run_kinds import check_costs, rank_by_cost
-from soilml.gap.evidence.held_out import predictive_gains
-from soilml.gap.evidence.holdout_split import HoldoutSplit, split_holdout
-from soilml.gap.evidence.order_trend import order_trends
-from soilml.gap.report.results import GapReport
-from soilml.gap.report.sentences import headline, report_lines, unsupported_conclusions
-from soilml.gap.verdict.agreement import (
-    hidden_effect,
+from soilml.gap.cause_of_remainder import described_cause
+from soilml.gap.checks import ONE_LOAD, estimate_repeat_noise, faults_of, naming_obstacles
+from soilml.gap.conclusions import (
+    like_another_force,
+    like_another_soil,
+    unsupported_conclusions,
+)
+from soilml.gap.decision import decide, ranked_sets, reasons, suspects
+from soilml.gap.disagreements import (
+    disagreements,
     misfit_remarks,
     noise_agreement,
     opened_priors,
-    trend_remarks,
-)
-from soilml.gap.verdict.cause_of_remainder import described_cause
-from soilml.gap.verdict.decision import (
-    decide,
-    ranked_sets,
-    reasons,
-    suspects,
-)
-from soilml.gap.verdict.disagreements import (
-    disagreements,
-    repeats_that_disagree,
     unpredicted_rows,
 )
-from soilml.gap.verdict.entries import (
-    analysis_notes,
+from soilml.gap.estimates import (
     candidate_summaries,
-    competing_explanations,
-    conditions_of_suspects,
     named_effects,
-    outlier_names,
-    readings_and_predictions,
-    repeat_notes,
-    signature_similarity,
-    variance_component_entries,
-)
-from soilml.gap.verdict.estimates import (
     returned_case,
+    signature_similarity,
     soil_after,
     soil_before,
+    variance_component_entries,
     whole_answer,
 )
-from soilml.gap.verdict.lookalikes import like_another_force, like_another_soil
-from soilml.gap.verdict.reductions import (
+from soilml.gap.held_out import (
+    HoldoutSplit,
     gap_reductions,
-    grown_channels,
     plain_fits,
     predict_held_out,
+    predictive_gains,
+    split_holdout,
     unexplained_figures,
     without_grown,
 )
-from soilml.gap.verdict.remainder import (
-    discrepancy_map,
-    remaining_discrepancy,
-)
+from soilml.gap.next_runs import competing_explanations, next_runs
+from soilml.gap.notes import analysis_notes, hidden_effect, outlier_names
+from soilml.gap.order_trend import order_trends, trend_remarks
+from soilml.gap.remainder import discrepancy_map, remaining_discrepancy
+from soilml.gap.repeats import repeats_that_disagree
+from soilml.gap.results import GapReport
+from soilml.gap.run_options import check_costs, rank_by_cost
+from soilml.gap.sentences import headline, report_lines
 from soilml.inference import constants
 from soilml.inference.posterior import Posterior, infer
 from soilml.inference.problem import InferenceProblem
@@ -193,31 +179,28 @@ def gap(
     readings = with_zeros_replaced(case, split.analysed, readings, refuse=False)
     repeat_noise, notes = estimate_repeat_noise(readings)
     readings, exclusions = readings.with_default_std(repeat_noise).with_known_noise()
-    notes += [*readings.notes, *exclusions]
-    checks = check_readings(readings, split.analysed, len(soil))
-    checks = replace(checks, notes=(*copies, *notes, *excluded_rows, *checks.notes))
-    if checks.errors:
-        remarks = (*checks.notes, *checks.naming_obstacles)
-        return _bad_data_report(case, checks.errors, remarks, seed)
+    notes = [*copies, *notes, *readings.notes, *exclusions, *excluded_rows]
+    if faults := tuple(faults_of(readings, len(soil))):
+        return _bad_data_report(case, faults, notes, seed)
+    obstacles = tuple(naming_obstacles(readings, len(soil)))
 
     problem = InferenceProblem.of(case, readings, soil, effects, calibration)
     with threads_for(len(readings)):
         posterior = infer(problem, progress or (lambda _: None))
         if error := _unusable(posterior, split.analysed.place):
-            return _bad_data_report(case, (error,), checks.notes, seed)
+            return _bad_data_report(case, (error,), notes, seed)
         held_out = None
         if split.held_out is not None:
             held_out = stack_readings(case, split.held_out).with_default_std(repeat_noise)
             held_out = held_out.subset(np.isfinite(held_out.std))
-        report = _build_report(case, posterior, checks, split, held_out, readings, seed=seed)
-        if report.model.remainder not in (None, case.remainder):
-            learned = report.model.remainder.of_rows(split.analysed)
-            report = replace(report, model=replace(report.model, remainder=learned))
-        report = replace(report, next_runs=tuple(rank_by_cost(report.next_runs, known_costs)))
+        report = _build_report(case, posterior, obstacles, notes, split, held_out, readings, seed)
+    if report.model.remainder not in (None, case.remainder):
+        learned = report.model.remainder.of_rows(split.analysed)
+        report = replace(report, model=replace(report.model, remainder=learned))
+    report = replace(report, next_runs=tuple(rank_by_cost(report.next_runs, known_costs)))
     lines = report_lines(report, effect_names(case))
     report = replace(report, sentence=headline(report), lines=lines)
-    fixed = fixed_parameters(case, soil)
-    conclusions = unsupported_conclusions(report, checks.naming_obstacles, fixed)
+    conclusions = unsupported_conclusions(report, obstacles, fixed_parameters(case, soil))
     conclusions += like_another_soil(posterior, posterior.soil.fit)
     first = report.cause_set[0] if report.cause_set else report.best_unclaimed
     conclusions += like_another_force(posterior, first)
@@ -225,11 +208,11 @@ def gap(
 
 
 def _bad_data_report(
-    case: Case, errors: Sequence[Remark], notes: tuple[Remark, ...], seed: int
+    case: Case, errors: Sequence[Remark], notes: Iterable[Remark], seed: int
 ) -> GapReport:
     """The report on data that cannot be analysed."""
-    report = GapReport("bad-data", "", case, reasons=tuple(errors), notes=notes, seed=seed)
-    return replace(report, sentence=headline(report), lines=report_lines(report))
+    report = GapReport("bad-data", "", case, reasons=tuple(errors), notes=tuple(notes), seed=seed)
+    return replace(report, sentence=headline(report))
 
 
 def _unusable(posterior: Posterior, place: Callable[[int], str]) -> Remark | None:
@@ -255,26 +238,29 @@ def _unusable(posterior: Posterior, place: Callable[[int], str]) -> Remark | Non
 def _build_report(
     case: Case,
     posterior: Posterior,
-    checks: DataCheckResult,
+    naming: tuple[Remark, ...],
+    notes: Sequence[Remark],
     split: HoldoutSplit,
     held_out: Readings | None,
     readings: Readings,
-    *,
     seed: int,
 ) -> GapReport:
-    """Decide the status, then compute the entries of the report."""
+    """Decide the status, then compute the entries of the report.
+
+    naming: Why the rows cannot identify a cause.
+    """
     gains = predictive_gains(posterior, ranked_sets(posterior)[:SCORED], seed)
     quiet = posterior.no_gap > constants.NO_GAP
     alone, _ = plain_fits(posterior, None)
     opened = opened_priors(posterior)
-    obstacles = (*opened, *checks.naming_obstacles)
-    agreement = noise_agreement(case, readings, posterior.problem.soil, posterior, alone)
+    obstacles = (*opened, *naming)
+    agreement = noise_agreement(case, readings, posterior, alone)
     trends = order_trends(posterior, seed)
     drift, conflicts = trend_remarks(trends), list[Remark]()
     if quiet:
         conflicts = [*drift, *misfit_remarks(agreement, case, posterior, alone)]
         conflicts += disagreements(posterior)
-        conflicts += unexplained_figures(gap_reductions(posterior, None, (alone, alone), seed)[0])
+        conflicts += unexplained_figures(gap_reductions(posterior, (alone, alone), seed))
         if held_out is not None and len(held_out):
             conflicts += unpredicted_rows(posterior, held_out, split.description)
     decision = decide(posterior, gains, obstacles, conflicts)
@@ -282,19 +268,17 @@ def _build_report(
         conflicts = list(opened)
     shown = decision.shown
     fits = plain_fits(posterior, shown)
-    figures, beside_remainder = gap_reductions(posterior, shown, fits, seed)
+    figures = gap_reductions(posterior, fits, seed)
     if held_out is not None and len(held_out):
         figures[split.name] = predict_held_out(posterior, fits, held_out, split.description)
-    addition = " + ".join(shown.hypothesis.effects) if shown else ""
-    figures, not_reduced = without_grown(figures, addition)
-    beside_remainder, _ = without_grown(beside_remainder, addition)
+    figures, not_reduced = without_grown(
+        figures, " + ".join(shown.hypothesis.effects) if shown else ""
+    )
     smooth_gap = decision.status not in ("no-gap", "undecided")
     whole = whole_answer(posterior, decision)
     written = whole or shown or posterior.soil
     replicates = repeats_that_disagree(posterior, written.fit) if smooth_gap else []
     listed = suspects(posterior, decision, gains) if smooth_gap else []
-    doubted = [node for s in listed if s.times_usual and (node := posterior.node_of(s.effects))]
-    explained = shown if decision.claimed and shown is not None else posterior.soil
     report = GapReport(
         status=decision.status,
         sentence="",
@@ -304,23 +288,15 @@ def _build_report(
         best_unclaimed=listed[0].effects if listed and not decision.claimed else (),
         reasons=reasons(decision, obstacles, conflicts or replicates),
         gap=figures,
-        gap_beside_remainder=beside_remainder,
         soil_before=soil_before(alone),
         soil_after=soil_after(posterior, seed),
         candidates=tuple(candidate_summaries(posterior, decision)),
         untestable=dict(posterior.untestable),
         notes=(
-            *checks.notes,
+            *notes,
             *not_reduced,
-            *analysis_notes(
-                posterior,
-                alone,
-                written,
-                [explained, *([shown] if shown else []), *doubted],
-                split.analysed.place,
-            ),
-            *repeat_notes(replicates),
-            *grown_channels(figures, addition),
+            *analysis_notes(posterior, alone, written, split.analysed.place),
+            *(replace(r, text=f"replicate rows disagree: {r}") for r in replicates),
             *(drift if smooth_gap else ()),
             *(hidden_effect(posterior, alone) if decision.status == "no-gap" else ()),
         ),
@@ -330,7 +306,7 @@ def _build_report(
         gap_probability=1.0 - posterior.no_gap,
         remainder_probability=1.0 - (shown or posterior.soil).share_without,
         seed=seed,
-        curves=readings_and_predictions(posterior, *fits),
+        curves=FittedReadings.of_solutions(*fits, posterior.std),
     )
     if decision.claimed and shown is not None:
         similarity = signature_similarity(posterior, shown)
@@ -341,17 +317,28 @@ def _build_report(
         )
     if not smooth_gap:
         return report
-    conditions = conditions_of_suspects(posterior, obstacles)
+    explained = shown if decision.claimed and shown is not None else posterior.soil
     rivals = competing_explanations(posterior, decision, listed)
     return replace(
         report,
         suspects=tuple(listed),
-        conditions=conditions,
+        conditions=tuple(_conditions(posterior, obstacles)),
         where=tuple(discrepancy_map(posterior, alone)),
         discrepancy=remaining_discrepancy(posterior, posterior.soil, shown or posterior.soil),
         remainder_cause=described_cause(posterior, explained, seed),
         next_runs=tuple(next_runs(posterior, rivals)),
     )
+
+
+def _conditions(posterior: Posterior, obstacles: Sequence[Remark]) -> Iterator[Remark]:
+    """The conditions under which the odds of suspects are valid."""
+    text = "no other cause than those of the catalogue has a similar signature"
+    yield Remark("catalogue-complete", text)
+    if len(posterior.terms.readings.runs) == 1:
+        yield Remark("one-bed", "the bed was the same for all rows")
+    if any(obstacle.code == ONE_LOAD for obstacle in obstacles):
+        text = "the soil parameters lie inside their priors, because one load cannot test them"
+        yield Remark("inside-priors", text)
 
 
 def _check_size(table: Table) -> None:

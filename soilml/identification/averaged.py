@@ -12,9 +12,9 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.candidate_effects import candidate_effects
 from soilml.fitting.coordinates import Coordinate, values_at
+from soilml.fitting.global_optimum import raise_uncarried
 from soilml.fitting.misfit import Misfit, fit_under_declared_noise, misfit_limit
 from soilml.fitting.readings import Readings
-from soilml.fitting.uncarried_loads import raise_uncarried
 from soilml.identification.fit import Fit, SoilExplanation, with_warnings
 from soilml.identification.posterior import (
     PosteriorSamples,

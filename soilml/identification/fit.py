@@ -265,7 +265,7 @@ def with_warnings(
         count = "1 reading" if readings.reading_count == 1 else f"{readings.reading_count} readings"
         text = f"{count} for {len(free)} parameters: the prior determines the rest"
         remarks.append(Remark("few-readings", text, fit.names))
-    remarks += _trade_offs(fit)
+    remarks += trade_offs(fit)
     if excess_residuals:
         remarks.append(excess_residuals_remark(float(np.sqrt(fit.misfit)), case, excess_residuals))
     if undeclared:
@@ -295,7 +295,8 @@ def identifiability_remarks(name: str, fraction: float, one_load: bool = False) 
     return []
 
 
-def _trade_offs(fit: Fit) -> list[Remark]:
+def trade_offs(fit: Fit) -> list[Remark]:
+    """That two parameters compensate each other."""
     correlation = fit.correlation
     return [
         Remark(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,10 +11,10 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate, rates_at, values_at
+from soilml.fitting.damped_descents import EXACT, descend
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.misfit import Misfit, fit_under_declared_noise
 from soilml.fitting.readings import Readings
-from soilml.fitting.scipy_descents import descend
 from soilml.identification.fit import WIDENED, Fit, at_prior_bound, with_warnings
 from soilml.quantities import column
 
@@ -71,9 +72,8 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
     weighted, optimum = fit_under_declared_noise(case, readings, free)
     with_prior = optimum
     if np.any(at_prior_bound(optimum.x)):
-        with_prior = descend(
-            weighted.problem, optimum.x, with_prior=True, near=optimum.linearisation
-        )
+        problem = replace(weighted.problem, priors="all")
+        with_prior = descend(problem, optimum.x, EXACT, optimum.linearisation)
     return _fit(case, free, readings, optimum, with_prior, undeclared=undeclared)
 
 

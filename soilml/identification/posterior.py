@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,12 +13,12 @@ from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.covariance import noise_of_operation, squared_residuals_and_log_determinant
+from soilml.fitting.damped_descents import EXACT, descend
+from soilml.fitting.global_optimum import raise_uncarried
 from soilml.fitting.least_squares import SoilTestTerms, Solution
 from soilml.fitting.misfit import Misfit, WeightedRows, fit_under_declared_noise
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
-from soilml.fitting.scipy_descents import descend
-from soilml.fitting.uncarried_loads import raise_uncarried
 from soilml.identification.fit import WIDENED, Fit, with_warnings
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.resampling import latin_hypercube, systematic_resampling
@@ -181,7 +181,8 @@ def sample_posterior(
     if readings.reading_count < FEW_READINGS:
         sample = importance_sample(density, len(free), most_samples=MOST_SAMPLES)
     else:
-        best = descend(weighted.problem, best.x, with_prior=True, near=best.linearisation)
+        problem = replace(weighted.problem, priors="all")
+        best = descend(problem, best.x, EXACT, best.linearisation)
         sample = importance_sample(
             density,
             len(free),

@@ -1,10 +1,10 @@
-"""Large CSV files without a fault, by the reader of pyarrow where it is installed."""
+"""Text of plain cells by the reader of pyarrow, block by block, where it is installed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +16,55 @@ from soilml.io.table import TEXT, Column, text_column
 
 #: Bytes of the smallest file that is read so: below, the import of pyarrow takes longer.
 SMALLEST = 1 << 20
-BLOCK = 1 << 24  # Bytes that are held at a time
+BLOCK = 1 << 20  # Bytes that are held at a time
+Progress = Callable[[int], None] | None
+
+
+def blocks_of_cells(
+    opened: BinaryIO,
+    header: Sequence[str],
+    texts: Collection[str],
+    kept: Sequence[str],
+    progress: Progress,
+    *,
+    missing: Sequence[str] = ("",),
+    separator: str = ",",
+    decimal: str = ".",
+    bad_line: Callable[[Any], str] = lambda row: "error",
+    skip_empty: bool = False,
+) -> Iterator[Any]:
+    """Record batches of Arrow from the place of an opened file on, numbers where no text is.
+
+    Raises a `ValueError` of pyarrow for a cell that is no number, a line that `bad_line` does not
+    skip, and one that is longer than a block.
+    """
+    import pyarrow as pa
+    from pyarrow import csv
+
+    reader = csv.open_csv(
+        opened,
+        csv.ReadOptions(column_names=list(header), use_threads=False, block_size=BLOCK),
+        csv.ParseOptions(
+            delimiter=separator,
+            quote_char=False,
+            ignore_empty_lines=skip_empty,
+            invalid_row_handler=bad_line,
+        ),
+        csv.ConvertOptions(
+            column_types={n: pa.string() if n in texts else pa.float64() for n in header},
+            include_columns=list(kept),
+            null_values=list(missing),
+            decimal_point=decimal,
+        ),
+    )
+    for batch in reader:
+        yield batch
+        if progress is not None:
+            progress(opened.tell())
 
 
 def read_good_csv(
-    file: Path,
-    columns: Callable[[list[str]], Sequence[str]],
-    longest: int,
-    progress: Callable[[int], None] | None,
+    file: Path, columns: Callable[[list[str]], Sequence[str]], longest: int, progress: Progress
 ) -> tuple[dict[str, Column], NDArray[np.int64]] | None:
     """What `read_csv` gives, to the last bit; None where it has to look at the file itself.
 
@@ -33,54 +74,35 @@ def read_good_csv(
     if file.stat().st_size < SMALLEST:
         return None
     try:
-        return _read(file, columns, longest, progress)
+        with file.open("rb") as opened:
+            first = opened.readline(longest)
+            _need(first.endswith(b"\n") and b'"' not in first and b"\r" not in first[:-2])
+            header = [name.strip() for name in first.decode("utf-8-sig").split(",")]
+            _need(1 < len(header) <= COLUMNS.most)
+            kept = list(columns(header))
+            found: dict[str, list[Column]] = {name: [] for name in kept}
+            rows = 0
+            for batch in blocks_of_cells(opened, header, TEXT, kept, progress):
+                rows += len(batch)
+                _need(rows <= ROWS.most)
+                own = {name: _column(file, name, batch[name]) for name in kept}
+                _need(not all_blank(own.values(), len(batch)).any())
+                for name, values in own.items():
+                    found[name].append(values)
+        for name in set(TEXT) & found.keys():
+            _need(max(part.itemsize for part in found[name]) * rows <= TEXT_BYTES.most)
+        joined = {name: np.concatenate(parts) for name, parts in found.items()}
     except (ImportError, ValueError, TableError):  # pyarrow's own errors are kinds of `ValueError`
         return None
+    return joined, np.arange(2, rows + 2)
 
 
-def _read(
-    file: Path,
-    columns: Callable[[list[str]], Sequence[str]],
-    longest: int,
-    progress: Callable[[int], None] | None,
-) -> tuple[dict[str, Column], NDArray[np.int64]]:
-    """The same; raises `ValueError` where it is None."""
-    import pyarrow as pa
-    from pyarrow import csv
-
-    with file.open("rb") as opened:
-        first = opened.readline(longest)
-        _need(first.endswith(b"\n") and b'"' not in first)
-        header = [name.strip() for name in first.decode("utf-8-sig").split(",")]
-        _need(len(header) <= COLUMNS.most)
-        kept = list(columns(header))
-        types = {name: pa.string() if name in TEXT else pa.float64() for name in kept}
-        parsed = csv.ConvertOptions(column_types=types, include_columns=kept, null_values=[""])
-        found: dict[str, list[Column]] = {name: [] for name in kept}
-        lines, before = [np.zeros(0, dtype=np.int64)], 1
-        for block in _whole_lines(opened):
-            numbers, count = _lines(block, longest)
-            table = csv.read_csv(
-                pa.BufferReader(block),
-                csv.ReadOptions(use_threads=False, column_names=header, block_size=len(block) + 1),
-                csv.ParseOptions(quote_char=False),
-                parsed,
-            )
-            _need(len(table) == len(numbers))
-            blank = np.ones(len(table), dtype=bool)
-            for name in kept:
-                found[name].append(_column(file, name, table[name]))
-                blank &= found[name][-1] == "" if name in TEXT else np.isnan(found[name][-1])
-            _need(not blank.any())
-            lines.append(numbers + before)
-            before += count
-            _need(sum(map(len, lines)) <= ROWS.most)
-            if progress is not None:
-                progress(opened.tell())
-    for name in set(TEXT) & found.keys():
-        widest = max((part.itemsize for part in found[name]), default=0)
-        _need(widest * sum(map(len, found[name])) <= TEXT_BYTES.most)
-    return {name: np.concatenate(parts) for name, parts in found.items()}, np.concatenate(lines)
+def all_blank(columns: Collection[Column], count: int) -> NDArray[np.bool_]:
+    """Rows (count,) in which every column is blank."""
+    blank = np.ones(count, dtype=bool)
+    for values in columns:
+        blank &= values == "" if values.dtype.kind == "U" else np.isnan(values)
+    return blank
 
 
 def _need(holds: bool) -> None:
@@ -88,35 +110,15 @@ def _need(holds: bool) -> None:
         raise ValueError
 
 
-def _whole_lines(opened: Any) -> Iterator[bytes]:
-    """Blocks that end with a line."""
-    while block := opened.read(BLOCK):
-        yield block + opened.readline()
-
-
-def _lines(block: bytes, longest: int) -> tuple[NDArray[np.int64], int]:
-    """The numbers, from 1, of the lines that are not empty, and the count of all lines."""
-    _need(b'"' not in block and b"\0" not in block)
-    _need(block.count(b"\r") == block.count(b"\r\n"))
-    if not block.isascii():
-        block.decode()
-    bytes_ = np.frombuffer(block, dtype=np.uint8)
-    ends = np.flatnonzero(bytes_ == ord("\n"))
-    if not block.endswith(b"\n"):
-        ends = np.append(ends, len(block))
-    lengths = np.diff(ends, prepend=-1) - 1
-    _need(int(lengths.max(initial=0)) < longest)
-    empty = (lengths == 0) | ((lengths == 1) & (bytes_[ends - 1] == ord("\r")))
-    return np.flatnonzero(~empty) + 1, len(ends)
-
-
 def _column(file: Path, name: str, cells: Any) -> Column:
     """Cells as `read_csv` has them: text, or numbers with NaN where blank."""
     if name in TEXT:
-        coded = cells.combine_chunks().dictionary_encode()
-        texts = [cell_as_text(text.strip()) for text in coded.dictionary.to_pylist()]
+        coded = cells.dictionary_encode()
+        shown = [cell or "" for cell in coded.dictionary.to_pylist()]
+        _need('"' not in "".join(shown))
+        texts = [cell_as_text(cell.strip()) for cell in shown]
         column: Column = text_column(texts, lambda _: str(file))[coded.indices.to_numpy()]
         return column
-    values = np.asarray(cells.to_numpy(), dtype=np.float64)
+    values = np.asarray(cells.to_numpy(zero_copy_only=False), dtype=np.float64)
     _need(not np.isinf(values).any() and int(np.isnan(values).sum()) == cells.null_count)
     return values

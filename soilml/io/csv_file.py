@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import dropwhile, islice
 from pathlib import Path
 from typing import Any, TextIO, cast
 
@@ -19,9 +20,10 @@ from soilml.io.table import TEXT, Column, text_column
 
 BLOCK = 8192  # Rows whose cells are held as text at a time
 _LINE = 1_000_000  # Characters of a line; a longer one is not of a table
-#: Characters of a cell that a message shows.
-_SHOWN = 60
+_SHOWN = 60  # Characters of a cell that a message shows
 _QUOTES = "quotation marks must stand in pairs around a whole cell"
+
+Rows = Iterable[tuple[int, list[str]]]  # Line of each row, and its cells
 
 
 def read_csv(
@@ -45,9 +47,10 @@ def read_csv(
         return found
     with file.open(encoding="utf-8-sig") as opened:
         reader, buffer = csv.reader(_lines(file, opened), strict=True), cast(Any, opened.buffer)
-        told = None if progress is None else lambda: progress(buffer.tell())
+        rows = ((reader.line_num, row) for row in reader)
         try:
-            return _columns(file, reader, columns, header_hint, told)
+            told = None if progress is None else lambda: progress(buffer.tell())
+            return _columns(file, rows, columns, header_hint, told)
         except UnicodeDecodeError as error:
             raise TableError(f"{file} cannot be read as text: {error}") from None
         except csv.Error as error:
@@ -61,63 +64,47 @@ def read_sheet(
 
     Raises as `read_csv` and `sheet_rows` do.
     """
-    return _columns(file, _SheetReader(sheet_rows(file)), columns, header_hint, None)
-
-
-class _SheetReader(Iterator[list[str]]):
-    """Rows of a sheet from its first one that is not blank, none shorter than that."""
-
-    def __init__(self, rows: list[list[str]]) -> None:
-        self.line_num = next((i for i, row in enumerate(rows) if row), len(rows))
-        self._rows, self._width = rows, len(rows[self.line_num]) if self.line_num < len(rows) else 0
-
-    def __next__(self) -> list[str]:
-        if self.line_num == len(self._rows):
-            raise StopIteration
-        self.line_num += 1
-        row = self._rows[self.line_num - 1]
-        return row + [""] * (self._width - len(row))
+    rows = [*dropwhile(lambda row: not row[1], enumerate(sheet_rows(file), 1))]
+    width = len(rows[0][1]) if rows else 0
+    filled = ((line, row + [""] * (width - len(row))) for line, row in rows)
+    return _columns(file, filled, columns, header_hint, None)
 
 
 def _columns(
     file: Path,
-    reader: Any,
+    rows: Rows,
     columns: Callable[[list[str]], Sequence[str]],
     header_hint: str,
     progress: Callable[[], None] | None,
 ) -> tuple[dict[str, Column], NDArray[np.int64]]:
     """The columns of rows of text, of which the first is the header, and the line of each."""
-    header = [name.strip() for name in next(reader, [])]
+    rows = iter(rows)
+    header = [name.strip() for name in next(rows, (0, []))[1]]
     if not header:
         raise TableError(f"{file} is empty; needed is a header: {header_hint}")
     COLUMNS.check(file, len(header))
     kept = list(columns(header))
-    places = [header.index(name) for name in kept]
-    blocks: list[list[Column]] = [[] for _ in kept]
-    lines: list[NDArray[np.int64]] = [np.zeros(0, dtype=np.int64)]
-    for numbers, rows in _blocks(file, reader, len(header)):
-        lines.append(numbers)
-        for name, place, filled in zip(kept, places, blocks, strict=True):
-            cells = [row[place].strip() for row in rows]
-            filled.append(_column(file, name, cells, numbers))
+    found = {n: [np.zeros(0, np.str_ if n in TEXT else np.float64)] for n in kept}
+    lines: list[int] = []
+    good = _good_rows(file, rows, len(header))
+    while block := [*islice(good, BLOCK)]:
+        lines += [line for line, _ in block]
+        ROWS.check(file, len(lines))
+        for name in kept:
+            place = header.index(name)
+            found[name].append(_column(file, name, [(n, row[place].strip()) for n, row in block]))
         if progress is not None:
             progress()
-    for name, filled in zip(kept, blocks, strict=True):
-        longest = max((part.itemsize for part in filled), default=0)
-        TEXT_BYTES.check(f"{file}, column {name}", longest * sum(map(len, filled)) * (name in TEXT))
-    empty = {name: np.zeros(0, np.str_ if name in TEXT else np.float64) for name in kept}
-    found = {
-        name: np.concatenate([empty[name], *filled])
-        for name, filled in zip(kept, blocks, strict=True)
-    }
-    return found, np.concatenate(lines)
+    for name in {*kept} & {*TEXT}:
+        longest = max(part.itemsize for part in found[name])
+        TEXT_BYTES.check(f"{file}, column {name}", longest * len(lines))
+    joined = {name: np.concatenate(parts) for name, parts in found.items()}
+    return joined, np.asarray(lines, dtype=np.int64)
 
 
 def _lines(file: Path, opened: TextIO) -> Iterator[str]:
     """Lines of text; raises `TableError` for binary data and for endless lines."""
-    number = 0
-    while line := opened.readline(_LINE):
-        number += 1
+    for number, line in enumerate(iter(lambda: opened.readline(_LINE), ""), 1):
         if "\0" in line:
             raise TableError(f"{file} is not a CSV file: it contains binary data")
         if len(line) == _LINE:
@@ -125,49 +112,34 @@ def _lines(file: Path, opened: TextIO) -> Iterator[str]:
         yield line
 
 
-def _blocks(
-    file: Path, reader: Any, width: int
-) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
-    """Rows that are not blank, with their lines, in blocks."""
-    rows: list[list[str]] = []
-    lines: list[int] = []
-    total = 0
-    for row in reader:
+def _good_rows(file: Path, rows: Rows, width: int) -> Iterator[tuple[int, list[str]]]:
+    """Rows that are not blank; raises `TableError` for one that is not of the table."""
+    for line, row in rows:
         text = "".join(row)
         if not text.strip():
             continue
         if "\n" in text or "\r" in text:  # a quote that is not closed swallows the rows below
-            raise TableError(f"{file} line {reader.line_num}: a cell has several lines; {_QUOTES}")
+            raise TableError(f"{file} line {line}: a cell has several lines; {_QUOTES}")
         if len(row) != width:
-            raise TableError(
-                f"{file} line {reader.line_num}: {len(row)} cells; needed are {width}, as in the "
-                "header"
-            )
-        rows.append(row)
-        lines.append(reader.line_num)
-        total += 1
-        ROWS.check(file, total)
-        if len(rows) == BLOCK:
-            yield np.asarray(lines, dtype=np.int64), rows
-            rows, lines = [], []
-    if rows:
-        yield np.asarray(lines, dtype=np.int64), rows
+            needed = f"needed are {width}, as in the header"
+            raise TableError(f"{file} line {line}: {len(row)} cells; {needed}")
+        yield line, row
 
 
-def _column(file: Path, name: str, cells: list[str], lines: NDArray[np.int64]) -> Column:
-    """Cells as text or as numbers, NaN where blank."""
+def _column(file: Path, name: str, cells: Sequence[tuple[int, str]]) -> Column:
+    """Cells with their lines as text or as numbers, NaN where blank."""
     if name in TEXT:
-        texts = [cell_as_text(cell) for cell in cells]
-        return text_column(texts, lambda i: f"{file} line {lines[i]}, column {name}")
-    filled = [i for i, cell in enumerate(cells) if cell]
+        texts = [cell_as_text(cell) for _, cell in cells]
+        return text_column(texts, lambda i: f"{file} line {cells[i][0]}, column {name}")
+    filled = [i for i, (_, cell) in enumerate(cells) if cell]
     values = np.full(len(cells), np.nan)
     try:
-        values[filled] = read_numbers([cells[i] for i in filled])
+        values[filled] = read_numbers([cells[i][1] for i in filled])
     except ValueError:
-        wrong = next(i for i in filled if not is_number(cells[i]))
-        shown = cells[wrong] if len(cells[wrong]) <= _SHOWN else f"{cells[wrong][:_SHOWN]}..."
+        line, cell = next(one for one in cells if one[1] and not is_number(one[1]))
+        shown = cell if len(cell) <= _SHOWN else f"{cell[:_SHOWN]}..."
         raise TableError(
-            f"{file} line {lines[wrong]}, column {name}: {shown!r} is not a number; needed "
+            f"{file} line {line}, column {name}: {shown!r} is not a number; needed "
             "is a finite number, or a blank cell where it was not measured"
         ) from None
     return values

@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
-from soilml.io.table import Table
-from soilml.log_import.channels.gear_of_run import gear_of
+from soilml.io.table import TEXT, Table
 from soilml.log_import.channels.inputs import Inputs, channel_constant, combined, our_slip
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.channels.wheel_quantities import Conversion
+from soilml.log_import.channels.wheel_quantities import Conversion, gear_of
 from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
-from soilml.log_import.windows.mean_errors import mean_error, pooled_errors
-from soilml.log_import.windows.slip_errors import travel_ratio
+from soilml.log_import.windows.mean_errors import mean_error, pooled_errors, travel_ratio
 from soilml.log_import.windows.steady import Stretch
 from soilml.quantities import column
 from soilml.remarks import Remark
@@ -73,22 +71,15 @@ def by_name(dictionaries: Sequence[Mapping[str, float]]) -> dict[str, Floats]:
     return {name: np.asarray([one.get(name, np.nan) for one in dictionaries]) for name in names}
 
 
-def values_of(rows: Sequence[WindowRow]) -> dict[str, Floats]:
-    """Quantities and slope (rows,) by name, NaN where a row has none."""
-    slopes = [{"slope": row.means["slope"]} if "slope" in row.means else {} for row in rows]
-    return by_name([row.values | slope for row, slope in zip(rows, slopes, strict=True)])
-
-
 def window_row(
     window: Stretch, inputs: Inputs, series: Mapping[str, Floats], run: Run, conversion: Conversion
 ) -> WindowRow:
     """The row of a window; `series` are the quantities over time."""
-    rows = np.asarray((inputs.time >= window.start) & (inputs.time <= window.stop))
+    rows = inputs.within(window.start, window.stop)
     means = {
         role: float(np.nanmean(values[rows])) if np.isfinite(values[rows]).any() else float("nan")
         for role, values in inputs.values.items()
-    }
-    means |= inputs.constants
+    } | inputs.constants
     slip_error = _exact_speeds(means, inputs, rows, conversion)
     values = {k: float(v) for k, v in conversion.of(means).items()}
     std: dict[str, float] = {}
@@ -125,17 +116,14 @@ def _exact_speeds(
     ground_role = next((r for r in ("position", "ground_speed") if r in channels), None)
     if rim_role is None or ground_role is None or "slip" in channels:
         return None
-    scale = 1.0
+    scale, rim_key = 1.0, "rim_speed"
     if rim_role != "rim_speed":
+        rim_key = "wheel_speed"
         scale = constants["radius"] / constants[f"{rim_role}.gear_ratio"]
-    rim_key = "rim_speed" if rim_role == "rim_speed" else "wheel_speed"
 
     def samples(role: str, key: str) -> Floats:
-        if role in inputs.places:
-            return inputs.places[role][rows]
-        if key in inputs.values:
-            return inputs.values[key][rows]
-        return np.full(int(rows.sum()), inputs.constants[key])
+        found = inputs.places.get(role, inputs.values.get(key))
+        return np.full(int(rows.sum()), inputs.constants[key]) if found is None else found[rows]
 
     _, error, rim_rate, ground_rate = travel_ratio(
         step=inputs.step,
@@ -157,11 +145,9 @@ def propagated(
     values: dict[str, Floats] = conversion.of(means)
     std: dict[str, Floats] = {}
     for role, error in errors.items():
-        if not np.any(error > 0.0):
-            continue
-        moved = conversion.of({**means, role: means[role] + np.nan_to_num(error)})
-        for name in _UNCERTAIN:
-            if name in moved and name in values:
+        if np.any(error > 0.0):
+            moved = conversion.of({**means, role: means[role] + np.nan_to_num(error)})
+            for name in {*_UNCERTAIN} & moved.keys() & values.keys():
                 change = np.nan_to_num(np.abs(moved[name] - values[name]))
                 std[name] = np.hypot(std.get(name, 0.0), change)
     return std
@@ -183,32 +169,32 @@ def table_rows(run: Run, conversion: Conversion) -> list[WindowRow]:
                 "steady run; needed is a speed or [slip], and no tare"
             )
         means[role], errors[role] = _readings(run, channel, count)
-    columns = conversion.of(means) | _carried(run)
     std = propagated(conversion, means, errors)
 
-    def at(found: Mapping[str, Floats], i: int) -> dict[str, float]:
-        return {k: float(np.broadcast_to(v, (count,))[i]) for k, v in found.items()}
+    def by_row(found: Mapping[str, Floats]) -> list[dict[str, float]]:
+        whole = {name: np.broadcast_to(values, (count,)).tolist() for name, values in found.items()}
+        return [{name: values[i] for name, values in whole.items()} for i in range(count)]
 
+    parts = (by_row(found) for found in (means, conversion.of(means) | _carried(run), std))
     return [
-        WindowRow(
-            Stretch(run.times[0][i], run.times[0][i]), at(means, i), at(columns, i),
-            {k: v for k, v in at(std, i).items() if v > 0.0},
-        )
-        for i in range(count)
-    ]  # fmt: skip
+        WindowRow(Stretch(time, time), own, values, {k: v for k, v in error.items() if v > 0.0})
+        for time, own, values, error in zip(run.times[0].tolist(), *parts, strict=True)
+    ]
 
 
 def _readings(run: Run, channel: ChannelMap, count: int) -> tuple[Floats, Floats]:
     """Readings (rows,) in the units of soilml, and their standard errors, 0 where not known."""
     if not channel.columns:
         return np.full(count, channel_constant(run, channel)), np.zeros(count)
-    given = combined(channel, [run.find(address)[1] for address in channel.columns])
+    columns = [run.find(address)[1] for address in channel.columns]
+    of_slip = channel.role == "slip"  # whose definition comes last
+    given = channel.scale * columns[0] if of_slip else combined(channel, columns)
     error = np.asarray(channel.noise.std(given), dtype=np.float64) * np.ones(count)
     if channel.std_column:
         stated = channel.std_scale * np.abs(run.find(channel.std_column)[1])
         stated = stated * np.abs(given) if channel.std_is_share else stated
         error = np.hypot(error, np.nan_to_num(stated))
-    if channel.role != "slip":
+    if not of_slip:
         return given, error
     ours = our_slip(given, channel.definition)
     return ours, np.abs(our_slip(given + error, channel.definition) - ours)
@@ -249,23 +235,21 @@ def irregular_windows(runs: Sequence[Sequence[WindowRow]]) -> dict[tuple[int, in
     for name, least in (("drawbar_pull", 0.0), ("slip", _LEAST_ERROR)):
         for i, rows in enumerate(runs):
             errors = np.asarray([row.std.get(name, np.nan) for row in rows])
-            lengths = np.asarray([row.window.stop - row.window.start for row in rows])
-            wandering = errors * np.sqrt(lengths)
-            known = np.isfinite(errors)
-            if known.sum() >= _FEWEST:
-                limits = np.full(len(rows), _TIMES * float(np.median(wandering[known])))
-            else:
+            wandering = errors * np.sqrt([row.window.stop - row.window.start for row in rows])
+            few = np.isfinite(errors).sum() < _FEWEST
+            if few:
                 loads = [row.values.get("load", np.nan) for row in rows]
-                one = np.asarray(loads if name == "drawbar_pull" else [1.0] * len(rows))
-                limits = _MOST_WANDERING * np.abs(one)
+                one = np.abs(loads) if name == "drawbar_pull" else np.ones(len(rows))
+                usual, limits = _MOST_WANDERING * one, _MOST_WANDERING * one
+            else:
+                usual = np.full(len(rows), float(np.nanmedian(wandering)))
+                limits = _TIMES * usual
             for k in np.flatnonzero((wandering > limits) & (errors > least)):
-                usual, than = float(limits[k]) / _TIMES, "in the middle of the windows"
-                if known.sum() < _FEWEST:
-                    usual, than = float(limits[k]), "windows of any rig at most do"
                 text = (
                     f"it is irregular: the {name.replace('_', ' ')} wanders "
-                    f"{wandering[k] / usual:.2g} times as much as {than}, as if someone had "
-                    "touched the rig"
+                    f"{wandering[k] / usual[k]:.2g} times as much as "
+                    f"{'windows of any rig at most do' if few else 'in the middle of the windows'}"
+                    ", as if someone had touched the rig"
                 )
                 found[(i, int(k))] = Remark("irregular", text, (name,))
     return found
@@ -295,12 +279,11 @@ def rows_as_table(
     """The table of all rows, in order of runs, wheels and time; without times where not `timed`."""
     lines: list[dict[str, Any]] = []
     for wheel, run, rows in groups:
+        named = {"run": f"{run.name}_{wheel.name}" if wheel.name else run.name}
+        named |= {"wheel": wheel.name} if wheel.name else {}
+        named |= {"gear": gear} if (gear := gear_of(wheel, run)) else {}
         for row in rows:
-            line: dict[str, Any] = {"run": f"{run.name}_{wheel.name}" if wheel.name else run.name}
-            if wheel.name:
-                line["wheel"] = wheel.name
-            if gear := gear_of(wheel, run):
-                line["gear"] = gear
+            line: dict[str, Any] = dict(named)
             for name in (*_UNCERTAIN, "vibration"):
                 if name in row.values:
                     line[column(name)] = row.values[name]
@@ -308,25 +291,20 @@ def rows_as_table(
                     # a channel that was set has no scatter: its error is not known, and not zero
                     some = std > _NO_SCATTER * max(abs(row.values[name]), _NO_SCATTER)
                     line[f"{column(name)}_std"] = std if some else float("nan")
-            for name in ("speed", *_CARRIED):
-                if name in row.values:
-                    line[column(name)] = row.values[name]
+            line |= {column(n): row.values[n] for n in ("speed", *_CARRIED) if n in row.values}
             if timed:
                 line[column("time")] = (row.window.start + row.window.stop) / 2.0
             if wheel.radius is not None and wheel.leg is None:
                 # a model file of another wheel is refused, since slip is that of this radius
                 line.setdefault(column("wheel_radius"), wheel.radius.value)
-            line["source"] = run.recordings[0].file.name
-            lines.append(line)
-    text = ("run", "wheel", "gear", "source")
+            lines.append(line | {"source": run.recordings[0].file.name})
+    always = ("slip", "torque_Nm")  # blank where not measured
     columns: dict[str, Any] = {}
-    for name in dict.fromkeys(name for line in lines for name in line):
-        if name in text:
+    for name in dict.fromkeys([*(n for line in lines for n in line), *(always if lines else ())]):
+        if name in TEXT:
             columns[name] = np.asarray([line.get(name, "") for line in lines], dtype=np.str_)
         else:
-            columns[name] = np.asarray([line.get(name, np.nan) for line in lines], dtype=float)
-    always = ("slip", "torque_Nm")  # blank where not measured
-    for name in always if lines else ():
-        columns.setdefault(name, np.full(len(lines), np.nan))
-    kept = {n for n, v in columns.items() if n in (*always, *text) or np.isfinite(v).any()}
-    return Table({name: values for name, values in columns.items() if name in kept}, source)
+            values = np.asarray([line.get(name, np.nan) for line in lines], dtype=float)
+            if name in always or np.isfinite(values).any():
+                columns[name] = values
+    return Table(columns, source)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +11,8 @@ from soilml.arrays import Floats
 from soilml.config.measurement_noise import Noise
 from soilml.log_import.channels.inputs import Inputs, wheel_inputs
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.channels.shared_errors import SharedError, shared_errors
-from soilml.log_import.channels.wheel_quantities import Conversion
-from soilml.log_import.checks.column_units import differing_units, unit_hints
-from soilml.log_import.checks.independence import with_shared_errors
+from soilml.log_import.channels.wheel_quantities import Conversion, SharedError
+from soilml.log_import.checks.columns import differing_units, unit_hints, with_shared_errors
 from soilml.log_import.checks.row_hints import RowsToCheck
 from soilml.log_import.checks.sensors import (
     dead_sensors,
@@ -32,7 +30,6 @@ from soilml.log_import.rows import (
     pool_errors,
     table_rows,
     unusable,
-    values_of,
     window_row,
 )
 from soilml.log_import.stance_rows import stance_rows, without_rolling
@@ -54,19 +51,20 @@ class WheelRows:
     ) -> None:
         wheel, self.computed = with_shared_errors(wheel, runs)
         self.log_map, self.wheel, self.runs = log_map, wheel, runs
+        self.of = f" of wheel {wheel.name}" if wheel.name else ""
         self.conversion = Conversion(wheel, log_map.vehicle)
         self.inputs: list[Inputs] = []
         self.dead: list[dict[str, str]] = [{} for _ in runs]
         self.quantities: list[dict[str, Floats]] = []
         self.stretches: list[list[Stretch]] = [[] for _ in runs]
+        self.rows: list[list[WindowRow]] = []
+        odd: dict[tuple[int, int], Remark] = {}
         if log_map.runs.each_row:
             self.rows = [table_rows(run, self.conversion) for run in runs]
-            odd: dict[tuple[int, int], Remark] = {}
         else:
             self.inputs = [wheel_inputs(run, wheel) for run in runs]
             self.dead = dead_sensors(self.inputs)
-            stage = f"finding steady windows{' of ' + wheel.name if wheel.name else ''}"
-            self.rows = []
+            stage = f"finding steady windows{self.of}"
             for i in range(len(runs)):
                 progress(stage, i, len(runs))
                 self.rows.append(self._windows(i))
@@ -89,7 +87,7 @@ class WheelRows:
 
     def _windows(self, i: int) -> list[WindowRow]:
         """The rows of a run over time; what is left out of it joins its stretches."""
-        run, inputs = self.runs[i], self.inputs[i]
+        run, inputs, windows = self.runs[i], self.inputs[i], self.log_map.windows
         for role in self.dead[i]:
             inputs.values[role] = np.full(inputs.time.size, np.nan)
         angle = without_rolling(inputs, self.wheel) if self.wheel.leg is not None else None
@@ -97,7 +95,6 @@ class WheelRows:
         series = {n: np.broadcast_to(v, inputs.time.shape) for n, v in quantities.items()}
         self.quantities.append(series)
         left_out = tuple(e for e in self.log_map.left_out if e.run in ("", run.name))
-        windows = self.log_map.windows
         if angle is not None:
             out, rows = stance_rows(inputs, angle, series, self.conversion, windows, left_out)
             self.stretches[i] += out
@@ -106,63 +103,51 @@ class WheelRows:
         self.stretches[i] += [s for s in stretches if s.why]
         kept = (s for s in stretches if not s.why)
         rows = [window_row(s, inputs, quantities, run, self.conversion) for s in kept]
-        self.computed += [replace(remark, text=f"run {run.name}: {remark.text}")
-                          for remark in drop_clipped(inputs, rows)]  # fmt: skip
+        self.computed += [r.under(f"run {run.name}: ") for r in drop_clipped(inputs, rows)]
         return rows
 
     def hints(self) -> list[Remark]:
         """What says that the map is wrong, by all windows, left out or not."""
-        return unit_hints(self.log_map, self.wheel, self.runs[0]) + self._checked(self.rows, True)
+        units = unit_hints(self.log_map, self.wheel, self.runs[0])
+        return [*units, *self._checked(self.rows, True)]
 
-    def _checked(self, rows: Sequence[Sequence[WindowRow]], wrong: bool) -> list[Remark]:
+    def _checked(self, rows: Sequence[Sequence[WindowRow]], wrong: bool) -> Iterator[Remark]:
         """Hints at what is `wrong`, or merely odd, in rows of runs."""
-        values = values_of([row for own in rows for row in own])
+        values = by_name([row.values for own in rows for row in own])
         radius = self.wheel.radius.value if self.wheel.radius is not None else None
-        of = f" of wheel {self.wheel.name}" if self.wheel.name else ""
-        return [
-            Remark(hint.code, f"{self.log_map.source}{of}: {hint.text}", hint.about)
-            for hint in RowsToCheck(values, radius, self.wheel, self.log_map.vehicle).hints()
-            if hint.wrong == wrong
-        ]
+        for hint in RowsToCheck(values, radius, self.wheel, self.log_map.vehicle).hints():
+            if hint.wrong == wrong:
+                yield Remark(hint.code, f"{self.log_map.source}{self.of}: {hint.text}", hint.about)
 
     def remarks(self) -> list[Remark]:
         """Dead and untared sensors; odd rows, and rows of a table that are left out."""
-        self.computed += self._checked(self.kept, False)
+        found = [*self.computed, *self._checked(self.kept, False)]
         if self.log_map.runs.each_row:
-            return self.computed + [
-                replace(s.why, text=f"row {s.start + 1:.0f} of {run.recordings[0].file.name} is "
-                        f"left out: {s.why}")
+            return found + [
+                s.why.under(f"row {s.start + 1:.0f} of {run.recordings[0].file.name} is left out: ")
                 for run, own in zip(self.runs, self.stretches, strict=True) for s in own if s.why
             ]  # fmt: skip
-        of = f" of wheel {self.wheel.name}" if self.wheel.name else ""
-        found = list(self.computed)
         for run, dead, inputs in zip(self.runs, self.dead, self.inputs, strict=True):
             if len(dead) > 2 and len(dead) >= len(inputs.values) - 1:
-                text = f"run {run.name}: no sensor{of} says anything: an empty log?"
+                text = f"run {run.name}: no sensor{self.of} says anything: an empty log?"
                 found.append(Remark("empty-log", text, (run.name,)))
                 continue
             for role, why in dead.items():
-                text = f"run {run.name}: the sensor of [{role}]{of} is dead: {why}"
+                text = f"run {run.name}: the sensor of [{role}]{self.of} is dead: {why}"
                 found.append(Remark("dead-sensor", text, (role, run.name)))
-        found += untared_sensors(self.wheel, self.inputs)
-        found += untared_load(self.wheel, self.inputs)
+        found += untared_sensors(self.wheel, self.inputs) + untared_load(self.wheel, self.inputs)
         return found + differing_units(self.wheel, self.runs[0])
 
     def shared_errors(self) -> tuple[dict[str, Noise], list[SharedError]]:
-        """The errors that the rows share by the constants of the map; see `shared_errors`."""
+        """The errors that the rows share by the constants of the map."""
         means = by_name([row.means for own in self.kept for row in own])
-        if not means:
-            return {}, []
-        return shared_errors(
-            lambda constants: self.conversion.of(means, constants), self.conversion.constants
-        )
+        return self.conversion.shared_errors(means) if means else ({}, [])
 
     def series(self, i: int) -> WheelSeries:
         """Quantities and stretches of one run."""
         run = self.runs[i]
-        windows = [row.window for row in self.kept[i]]
-        notes = (*run.notes, *self.inputs[i].notes)
-        notes += tuple(
+        stretches = [*self.stretches[i], *(row.window for row in self.kept[i])]
+        dead = (
             Remark("dead-sensor", f"[{role}] is dead: {why}", (role,))
             for role, why in self.dead[i].items()
         )
@@ -171,6 +156,6 @@ class WheelRows:
             drive=run.name,
             time=self.inputs[i].time,
             quantities=self.quantities[i],
-            stretches=tuple(sorted([*self.stretches[i], *windows], key=lambda s: s.start)),
-            notes=notes,
+            stretches=tuple(sorted(stretches, key=lambda s: s.start)),
+            notes=(*run.notes, *self.inputs[i].notes, *dead),
         )

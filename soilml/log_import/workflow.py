@@ -11,9 +11,8 @@ import numpy as np
 
 from soilml.errors import FitError, InputError
 from soilml.io.table import Table
-from soilml.log_import.channels.gear_of_run import wheels_by_gear
 from soilml.log_import.channels.runs import runs_of, runs_of_rows
-from soilml.log_import.channels.shared_errors import largest_errors
+from soilml.log_import.channels.wheel_quantities import largest_errors, wheels_by_gear
 from soilml.log_import.guesses.columns import is_size
 from soilml.log_import.mapping.log_map import LogMap, map_from, read_map
 from soilml.log_import.readers import read_log

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.report.numbers import format_band
 
 #: Fractions of the draws below the lower end, the median and the upper end of the band.
 QUANTILES = (0.05, 0.5, 0.95)
@@ -25,6 +26,11 @@ class QuantileBand:
         """Upper minus lower end."""
         return np.asarray(self.upper - self.lower)
 
+    def text(self, unit: str = "1", digits: int = 3) -> str:
+        """A single band in words; `unit` and `digits` as in `format_band`."""
+        low, middle, high = (float(part) for part in (self.lower, self.middle, self.upper))
+        return format_band(low, middle, high, unit, digits)
+
 
 def quantile_band(draws: Floats) -> QuantileBand:
     """Median and central 90 % interval of `draws` (n, ...) along the first axis.
@@ -34,6 +40,12 @@ def quantile_band(draws: Floats) -> QuantileBand:
     defined = np.isfinite(draws).any(axis=0)
     filled = np.where(defined, draws, 0.0)
     return QuantileBand(*np.where(defined, np.nanquantile(filled, QUANTILES, axis=0), np.nan))
+
+
+def band_columns(name: str, draws: Floats) -> dict[str, Floats]:
+    """Columns of the median and the 90 % band of draws (n, ...): NAME, NAME_p05, NAME_p95."""
+    band = quantile_band(draws)
+    return {name: band.middle, f"{name}_p05": band.lower, f"{name}_p95": band.upper}
 
 
 def chi_squared_quantile(degrees: float, normal_quantile: float) -> float:

@@ -26,7 +26,7 @@ JUDGED = 10  # Rows whose misfit is judged together
 #: Numbers of the belief beside those of the grounds: variance of the rim speeds about their mean,
 #: last mean rim speed (m/s), and the last misfits; below zero where there was none.
 RECENT = 2 + JUDGED
-#: Flags in the order of the graph's output; docs/how-to/slip-unknown.md explains them.
+#: Flags in the order of the graph's output; docs/how-to/drive.md explains them.
 FLAGS = (
     "standing",
     "passed-over",
@@ -112,7 +112,7 @@ class SlipEstimate:
 @final
 @dataclass(frozen=True)
 class SlipStream:
-    """Speed and slips row by row, state in and state out (docs/how-to/slip-unknown.md)."""
+    """Speed and slips row by row, state in and state out (docs/how-to/drive.md)."""
 
     session: Session = field(repr=False)
     path: str

@@ -7,30 +7,24 @@ when it slips, at the four slips above zero. Pull efficiency: a wheel 0.18 m wid
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
-from importlib import resources
 
 import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import FitError
 from soilml.onboard.fusion_rules import FusedEstimate, inverse_variance, pairwise
+from soilml.papers.published import printed
 from soilml.physics.gears import Midstance
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.pull_efficiency import pull_efficiency
 from soilml.physics.soils import Soil, soil
-from soilml.systems.wheel_legs import (
-    GROUNDS,
-    TORQUE_SLIP,
-    VIBRATION_SLIP,
-    SpringLeg,
-    vibration_amplitude,
-)
+from soilml.systems.wheel_legs.resistive_force import GROUNDS
+from soilml.systems.wheel_legs.stances import SpringLeg, vibration_amplitude
 from soilml.systems.wheel_legs.stride_relations import (
     GRAVITY,
     LINEAR,
@@ -38,6 +32,8 @@ from soilml.systems.wheel_legs.stride_relations import (
     SIMPLIFIED,
     SINKAGE,
     STIFFNESS,
+    TORQUE_SLIP,
+    VIBRATION_SLIP,
 )
 from soilml.systems.wheel_legs.strides import HEAVY_AT, HEAVY_WHEEL
 
@@ -163,27 +159,21 @@ def _soil_gain(name: str, index: int) -> float:
     return float(fused_soil(name).std) - STD[name][index]
 
 
-@cache
-def printed() -> dict[str, float]:
-    """The numbers of this chapter's table of numbers, by key."""
-    text = resources.files("soilml.papers").joinpath("comin2017_slip.csv").read_text("utf-8")
-    return {row["key"]: float(row["published"]) for row in csv.DictReader(text.splitlines())}
-
-
+PRINTED = printed("comin2017_slip")
 #: Models of table VIII of which table IX fuses the estimates, in the order of its weights.
 FUSED = ("ts", "vl", "s")
 
 
 def fused_error(ground: str, part: str, name: str) -> float:
     """Mean error (%) of a property on a soil: the weights of table IX on errors of table VIII."""
-    weights = (printed()[f"t9_{sense}_{name}_weight"] for sense in "tvs")
-    errors = (printed()[f"t8_{model}_{ground}_{part}_mean"] for model in FUSED)
+    weights = (PRINTED[f"t9_{sense}_{name}_weight"] for sense in "tvs")
+    errors = (PRINTED[f"t8_{model}_{ground}_{part}_mean"] for model in FUSED)
     return sum(w * e for w, e in zip(weights, errors, strict=True))
 
 
 def _error_gain(sense: int, part: str, name: str) -> float:
     """Change of the size of the mean error (%) by fusion, over all soils."""
-    alone = printed()[f"t8_{FUSED[sense]}_all_soils_{part}_mean"]
+    alone = PRINTED[f"t8_{FUSED[sense]}_all_soils_{part}_mean"]
     return abs(fused_error("all_soils", part, name)) - abs(alone)
 
 
@@ -205,10 +195,10 @@ def _mean_by_others(torque: str) -> float:
     """
 
     def apart(pair: str) -> float:
-        return printed()[f"t6_{pair}_mean_t"] - printed()[f"t6_{pair}_mean_v"]
+        return PRINTED[f"t6_{pair}_mean_t"] - PRINTED[f"t6_{pair}_mean_v"]
 
     between = apart("el") - apart("ep")
-    return printed()[f"t6_{torque}l_mean_t"] - (apart(f"{torque}p") + between)
+    return PRINTED[f"t6_{torque}l_mean_t"] - (apart(f"{torque}p") + between)
 
 
 #: By key of the CSV file of the same name.

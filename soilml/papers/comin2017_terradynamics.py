@@ -11,8 +11,15 @@ import numpy as np
 
 from soilml.arrays import Array, Floats
 from soilml.systems.wheel_legs.gaits import gait_metrics, walk_tables
-from soilml.systems.wheel_legs.geometry import FEET, MAX_LEGS, WheelLeg, wheel_leg
-from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround, stress_gains
+from soilml.systems.wheel_legs.resistive_force import (
+    FEET,
+    GROUNDS,
+    MAX_LEGS,
+    LinearGround,
+    WheelLeg,
+    resistance_terms,
+    wheel_leg,
+)
 from soilml.systems.wheel_legs.walk import walk
 
 #: Stiffnesses over which the paper compares feet, alpha_z from 0.4 to 1.0 N/cm^3, and the ground
@@ -140,8 +147,9 @@ def _fitted(key: str) -> float:
 
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
-    "alpha_z_flat": lambda: float(stress_gains(0.0, 0.5 * np.pi)[1]),
-    "alpha_x_flat": lambda: float(stress_gains(0.0, 0.5 * np.pi)[0]),
+    # of a flat plate pushed straight down, (rest + R z) upwards and against the travel
+    "alpha_z_flat": lambda: float(resistance_terms(1.0, 0.0)[1] + resistance_terms(1.0, 0.0)[5]),
+    "alpha_x_flat": lambda: -float(resistance_terms(1.0, 0.0)[0] + resistance_terms(1.0, 0.0)[3]),
     "rms_slip_legs": lambda: _lower(_legs("slip_rms")),
     "rms_slip_to_five": _slip_to_five,
     "rms_sinkage_legs": lambda: _lower(-_legs("sinkage_rms_m")),

@@ -21,12 +21,10 @@ from soilml.systems.rim_stress import (
     StressProfile,
     balanced_arc,
     bin_stress,
-    deconvolve,
-    find_modulus,
-    force_components,
     simulate_readings,
 )
-from soilml.systems.rim_stress.force_balance import pull_under
+from soilml.systems.rim_stress.force_balance import find_modulus, force_components, pull_under
+from soilml.systems.rim_stress.stress import deconvolve
 
 #: Table I pairs its five slips with the five slopes of section IV.A, in order.
 SLOPES = {0.11: 0.0, 0.18: 2.0, 0.29: 4.0, 0.39: 6.0, 0.80: 8.0}

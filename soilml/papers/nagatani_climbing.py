@@ -21,9 +21,9 @@ from soilml.systems.rim_stress import (
     StressBySlip,
     climbing_ability,
     identify_ground,
-    modulus_per_climb,
 )
-from soilml.systems.rim_stress.simulated_rover import SLOPES
+from soilml.systems.rim_stress.climbs import modulus_per_climb
+from soilml.systems.rim_stress.simulation import SLOPES
 
 CAMPAIGNS = 9  # Simulated campaigns, of which one is beyond the tolerance
 GENTLE, REPEATS = SLOPES[:2], 4  # Slopes from which the paper predicts, and repetitions of each

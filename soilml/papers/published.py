@@ -12,36 +12,16 @@ from importlib import resources
 
 from soilml.errors import InputError
 
-
-@dataclass(frozen=True)
-class Paper:
-    """Title of a paper, and its chapters where they differ from the paper's own name.
-
-    Each chapter is a pair CHAPTER.csv and CHAPTER.py in this folder.
-    """
-
-    title: str
-    chapters: tuple[str, ...] = ()
-
-
-#: By the name that `soilml paper numbers` takes.
-PAPERS: dict[str, Paper] = {
-    "nagatani2009": Paper("Nagatani, Ikeda, Sato and Yoshida 2009: a wheel with force sensors"),
-    "nagatani_climbing": Paper("Nagatani et al.: online estimation of climbing ability"),
-    "wang2018": Paper("Wang, Yan and Du 2018: a tracked robot's mobility"),
-    "comin2017": Paper(
-        "Comin and Saaj 2017: slip and soil from multi-legged wheel-legs",
-        ("comin2017_terradynamics", "comin2017_slip"),
-    ),
-    "xue2016": Paper("Xue et al. 2016: LS-SVM for the shearing parameters of lunar soil"),
+#: Titles by the name that `soilml paper numbers` takes, and the chapters of a paper that differ
+#: from its name: pairs CHAPTER.csv and CHAPTER.py in this folder.
+PAPERS = {
+    "nagatani2009": "Nagatani, Ikeda, Sato and Yoshida 2009: a wheel with force sensors",
+    "nagatani_climbing": "Nagatani et al.: online estimation of climbing ability",
+    "wang2018": "Wang, Yan and Du 2018: a tracked robot's mobility",
+    "comin2017": "Comin and Saaj 2017: slip and soil from multi-legged wheel-legs",
+    "xue2016": "Xue et al. 2016: LS-SVM for the shearing parameters of lunar soil",
 }
-
-
-def chapters(name: str) -> tuple[str, ...]:
-    """The chapters of a paper: its own name if it does not list any."""
-    return PAPERS[name].chapters or (name,)
-
-
+CHAPTERS = {"comin2017": ("comin2017_terradynamics", "comin2017_slip")}
 #: What a number is, as its row claims: code, and its name in tables.
 STATUSES = {
     "reproduced": "reproduced independently",
@@ -52,11 +32,10 @@ STATUSES = {
     "missed": "missed, with reason",
     "not_computed": "not computed: inputs not printed",
     "given": "given: input or setting",
-    "own_check": "not printed: own check",
     "wrong": "wrong: not what its row claims",
 }
 #: Statuses of rows whose computed number must lie within the tolerance.
-AGREEING = frozenset({"reproduced", "recovered", "arithmetic", "depends", "tuned", "own_check"})
+AGREEING = frozenset({"reproduced", "recovered", "arithmetic", "depends", "tuned"})
 #: Units of orders and counts, which papers state in words or draw; all others are quantities.
 ORDINAL = frozenset({"rank", "legs"})
 #: Columns of the CSV file of a chapter.
@@ -143,6 +122,17 @@ def count_statuses(found: Iterable[Comparison]) -> dict[str, dict[str, int]]:
     return {paper: {code: each[code] for code in occurring} for paper, each in counts.items()}
 
 
+def read_chapter(chapter: str) -> list[dict[str, str]]:
+    """The rows of the CSV file of a chapter."""
+    text = resources.files("soilml.papers").joinpath(f"{chapter}.csv").read_text("utf-8")
+    return list(csv.DictReader(text.splitlines()))
+
+
+def printed(chapter: str) -> dict[str, float]:
+    """The printed numbers of a chapter by key."""
+    return {row["key"]: float(row["published"]) for row in read_chapter(chapter)}
+
+
 def printed_numbers(paper: str | None = None) -> Iterator[PrintedNumber]:
     """Iterate over the printed numbers of one paper, or of all.
 
@@ -157,34 +147,23 @@ def printed_numbers(paper: str | None = None) -> Iterator[PrintedNumber]:
     if paper is not None and paper not in PAPERS:
         raise InputError(f"no paper {paper!r}; there are: {', '.join(PAPERS)}")
     for name in PAPERS if paper is None else (paper,):
-        for chapter in chapters(name):
+        for chapter in CHAPTERS.get(name, (name,)):
             module = importlib.import_module(f"soilml.papers.{chapter}")
-            text = resources.files("soilml.papers").joinpath(f"{chapter}.csv").read_text("utf-8")
-            for entry in csv.DictReader(text.splitlines()):
-                compute = module.COMPUTED.get(entry["key"])
-                others = getattr(module, "ALTERNATIVES", {}).get(entry["key"], ())
-                yield _parse_row(name, entry, compute, others)
-
-
-def _parse_row(
-    paper: str,
-    entry: dict[str, str],
-    compute: Callable[[], float] | None,
-    alternatives: tuple[Callable[[], float], ...],
-) -> PrintedNumber:
-    tolerance, relative = entry["tolerance"].strip(), entry["tolerance"].strip().endswith("%")
-    return PrintedNumber(
-        paper=paper,
-        key=entry["key"],
-        what=entry["what"],
-        source=entry["source"],
-        unit=entry["unit"],
-        published=float(entry["published"]),
-        tolerance=float(tolerance.rstrip("% ")) / 100.0 if relative else float(tolerance),
-        relative=relative,
-        claimed=entry["status"],
-        counted_with=entry["counted_with"],
-        reason=entry["reason"].strip(),
-        compute=compute,
-        alternatives=alternatives,
-    )
+            for entry in read_chapter(chapter):
+                tolerance = entry["tolerance"].strip()
+                relative = tolerance.endswith("%")
+                yield PrintedNumber(
+                    paper=name,
+                    key=entry["key"],
+                    what=entry["what"],
+                    source=entry["source"],
+                    unit=entry["unit"],
+                    published=float(entry["published"]),
+                    tolerance=float(tolerance.rstrip("% ")) / (100.0 if relative else 1.0),
+                    relative=relative,
+                    claimed=entry["status"],
+                    counted_with=entry["counted_with"],
+                    reason=entry["reason"].strip(),
+                    compute=module.COMPUTED.get(entry["key"]),
+                    alternatives=getattr(module, "ALTERNATIVES", {}).get(entry["key"], ()),
+                )

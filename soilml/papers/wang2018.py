@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable
 from functools import cache, partial
-from importlib import resources
 
 import numpy as np
 
+from soilml.papers.published import printed
 from soilml.physics.soils import soil
-from soilml.systems.tracked_robot.group_identification import implied_points
 from soilml.systems.tracked_robot.robot import BEYOND_PEAK, GROUSERS, WANG2018
 
 LEVEL = np.linspace(0.5, 0.9, 9)  # Slips over which the drawbar pull is averaged as its plateau
@@ -24,26 +22,27 @@ def plateau(ground: str, *, grousers: bool) -> float:
     return float(WANG2018.pull(soil(f"wang2018/{ground}"), LEVEL, effects).mean())
 
 
-@cache
-def printed() -> dict[str, float]:
-    """The numbers of the paper's table of numbers, by key."""
-    text = resources.files("soilml.papers").joinpath("wang2018.csv").read_text("utf-8")
-    return {row["key"]: float(row["published"]) for row in csv.DictReader(text.splitlines())}
-
-
 def group_mean(name: str) -> float:
     """Mean of one parameter over the eight groups of Table 1, angles in rad."""
     groups = [
-        v for key, v in printed().items() if key.startswith("table1_") and key.endswith(f"_{name}")
+        v
+        for key, v in printed("wang2018").items()
+        if key.startswith("table1_") and key.endswith(f"_{name}")
     ]
     mean = sum(groups) / len(groups)
     return math.radians(mean) if name == "friction_angle" else mean
 
 
+def implied_points(r2: float, f: float) -> float:
+    """Number of points implied by r2 and F of a line: F (1 - r2) / r2 + 2."""
+    return f * (1.0 - r2) / r2 + 2.0
+
+
 def variance_ratio() -> float:
     """F of a line with the printed r2 and the number of points implied by r2 and F."""
-    r2 = printed()["regression_r2"]
-    points = round(implied_points(r2, printed()["regression_f"]))
+    book = printed("wang2018")
+    r2 = book["regression_r2"]
+    points = round(implied_points(r2, book["regression_f"]))
     return r2 / (1.0 - r2) * (points - 2)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from soilml.results import Result
 from soilml.rover_design.performance import Outcomes, evaluate
 from soilml.rover_design.search import (
     DESIGNS,
+    QUANTILES,
     Designs,
     best_design,
     grid_fractions,
@@ -29,7 +31,7 @@ from soilml.rover_design.search import (
     tried,
 )
 from soilml.rover_design.search import at_fractions as dimensions_at
-from soilml.rover_design.study import DesignStudy
+from soilml.rover_design.study import DesignStudy, read_study
 from soilml.rover_design.uncertainty import (
     DRAWS,
     PossibleTest,
@@ -53,12 +55,12 @@ class SoilOutcome:
     """What the best design does on one of several soils.
 
     probability: Of meeting the goal.
-    margin: Ends of the 90 % band and median, N.
+    margin: Median and ends of the 90 % band, N, by column name.
     """
 
     name: str
     probability: float
-    margin: tuple[float, float, float]
+    margin: dict[str, float]
 
 
 @dataclass(frozen=True, repr=False)
@@ -103,11 +105,11 @@ class DesignReport(Result):
     tests: tuple[PossibleTest, ...]
     remarks: tuple[Remark, ...]
 
-    def report(self) -> Report:
+    def report(self, title: str = "Wheels of a rover") -> Report:
         """The best design, those beside it, and what its margin depends on."""
         from soilml.rover_design.presentation import report_of_design
 
-        return report_of_design(self)
+        return report_of_design(self, title)
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each design that was tried: its dimensions and results, SI units."""
@@ -134,11 +136,8 @@ class DesignReport(Result):
             "best": {**self.best_dimensions, **self.best},
             "front": self.front.tolist(),
             "designs": {name: values.tolist() for name, values in columns.items()},
-            "by_soil": {
-                one.name: {"probability": one.probability, "margin_N": one.margin[1],
-                           "margin_N_p05": one.margin[0], "margin_N_p95": one.margin[2]}
-                for one in self.by_soil
-            },
+            "by_soil": {one.name: {"probability": one.probability} | one.margin
+                        for one in self.by_soil},
             "variance_shares": {one.name: one.share for one in self.shares},
             "tests": [
                 {"test": one.text, "inputs": list(one.inputs), "share": one.share,
@@ -149,27 +148,54 @@ class DesignReport(Result):
         }  # fmt: skip
 
 
-def design_report(
-    study: DesignStudy,
+def design(
+    study: DesignStudy | str | os.PathLike[str],
     *,
     designs: int = DESIGNS,
     draws: int = WORLDS,
     optimise: bool = True,
     progress: Progress | None = None,
 ) -> DesignReport:
-    """The designs of a study that climb its slope, with what probability, margin and work.
+    """Which wheels climb a slope, with what margin and probability.
 
     All designs are compared under the same draws of the soil and of the model's error; the best one
     is evaluated again under others, so that its figures are not those of a lucky draw.
 
-    designs: Designs of the sweep.
-    draws: Draws of soil and model error, `WORLDS` by default.
-    optimise: Whether to search between the designs of the sweep.
-    progress: Given a stage, the number of designs done and that of all.
+    Parameters
+    ----------
+    study
+        The question: a file with [rover], [wheel], [soil] and [goal], or what `read_study` makes of
+        it.
+    designs
+        Number of designs of the sweep.
+    draws
+        Number of draws of the soil and of the model's error.
+    optimise
+        Whether to search between the designs of the sweep too.
+    progress
+        Function of the stage, the designs done and all of them.
 
-    Raises `InputError` where a wheel leaves the ground on the slope, and as `soil_of_rows`.
+    Returns
+    -------
+    DesignReport
+        The best design, all that were tried, and what its margin depends on.
+
+    Raises
+    ------
+    InputError
+        For a figure of the file that is missing or out of bounds, or a wheel that leaves the ground
+        on the slope.
+    FitError, TableError
+        As `identify`, where the soil is that of measured rows.
     """
-    stage = _stages(progress)
+    if not isinstance(study, DesignStudy):
+        study = read_study(study)
+
+    def stage(name: str, total: int) -> Callable[[int], None] | None:
+        if progress is None:
+            return None
+        return lambda done: progress(name, min(done, total), total)
+
     rows = soil_of_rows(study.soil)
     worlds = draw_worlds(study.soil, draws, study.goal.slip_limit, rows=rows)
     found = swept(study, worlds, designs, stage("designs", designs))
@@ -209,19 +235,11 @@ def _by_soil(worlds: DrawnWorlds, outcome: Outcomes) -> Iterator[SoilOutcome]:
         return
     for number, name in enumerate(worlds.kinds):
         own = worlds.kind == number
-        low, middle, high = (
-            float(quantile_of_worlds(outcome.margin[:, own], q)[0]) for q in (0.05, 0.5, 0.95)
-        )
-        yield SoilOutcome(name, float(outcome.met[0, own].mean()), (low, middle, high))
-
-
-def _stages(progress: Progress | None) -> Callable[[str, int], Callable[[int], None] | None]:
-    def stage(name: str, total: int) -> Callable[[int], None] | None:
-        if progress is None:
-            return None
-        return lambda done: progress(name, min(done, total), total)
-
-    return stage
+        margin = {
+            f"margin_N{ending}": float(quantile_of_worlds(outcome.margin[:, own], q)[0])
+            for ending, q in QUANTILES.items()
+        }
+        yield SoilOutcome(name, float(outcome.met[0, own].mean()), margin)
 
 
 def _remarks(
@@ -262,9 +280,6 @@ def _remarks(
         if "lug_count" in best and best["lug_count"] < needed:
             text = f"{best['lug_count']:g} lugs are too few: {needed:.0f} are needed between which "
             yield Remark("few-lugs", f"{text}the soil moves with the wheel", ("lug_count",))
-        elif "lug_count" not in best and math.isfinite(needed):
-            text = f"lugs are taken to be close enough: {needed:.0f} or more on a wheel"
-            yield Remark("lugs-needed", text, ("lug_count",), "note")
     if abs(study.gravity / GRAVITY["earth"] - 1.0) > 0.02:
         text = (
             f"gravity is {study.gravity:.3g} m/s^2: the soil is taken to have the parameters that "

@@ -193,12 +193,9 @@ def with_changes(
     risk: float | None = None,
 ) -> DesignStudy:
     """The study for another slope (rad), gravity, published soils, or risk; None keeps each."""
-    goal = study.goal
-    if slope is not None:
-        goal = replace(goal, slope=_bounded("--slope", slope, 0.0, math.radians(60.0), "rad"))
-    if risk is not None:
-        goal = replace(goal, risk=_bounded("--risk", risk, 0.001, 0.5, ""))
-    study = replace(study, goal=goal)
+    changed: dict[str, Any] = {"slope": slope, "risk": risk}
+    changed = {k: v for k, v in changed.items() if v is not None}
+    study = replace(study, goal=replace(study.goal, **changed))
     if gravity is not None:
         study = replace(study, gravity=read_gravity(gravity))
     if soils is not None:
@@ -290,11 +287,3 @@ def _published(names: list[str]) -> SoilQuestion:
     for name in names:
         soil(name)  # raises for one that there is not
     return SoilQuestion({name: soil_catalogue()[name] for name in names})
-
-
-def _bounded(what: str, value: float, low: float, high: float, unit: str) -> float:
-    if not low <= value <= high:
-        raise InputError(
-            f"{what} is {value:.4g} {unit}".rstrip() + f"; needed is {low:g} to {high:.4g}"
-        )
-    return value

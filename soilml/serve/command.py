@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from soilml.cli.option_values import whole_number_from
 from soilml.errors import InputError
-from soilml.io.cell_text import read_whole_number
 
 if TYPE_CHECKING:
     import socket
@@ -28,30 +28,10 @@ HOST = "127.0.0.1"  # The page is for this machine alone
 _LIBRARIES = ((("tornado", "serve"), ("scipy", "ground"), ("jinja2", "ground"),
                ("matplotlib", "ground"), ("pint", "ground")))  # fmt: skip
 PORT = 8642  # Where the page is served unless --port says otherwise
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "--port",
-        type=port_number,
-        default=PORT,
-        metavar="N",
-        help=f"port of the page (default: {PORT}; 0 takes a free one)",
-    )
-    parser.add_argument(
-        "--no-browser", action="store_true", help="print the address, and open no browser"
-    )
-
-
-def port_number(text: str) -> int:
-    """The number of a port; raises `ArgumentTypeError` for anything else."""
-    try:
-        if 0 <= (port := read_whole_number(text)) <= 65535:
-            return port
-    except ValueError:
-        pass
-    raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number from 0 to 65535")
+ARGUMENTS = (
+    (f"--port N ({PORT})", "port of the page; 0 takes a free one", whole_number_from(0, 65535)),
+    ("--no-browser", "print the address, and open no browser"),
+)
 
 
 def run(args: argparse.Namespace) -> int:

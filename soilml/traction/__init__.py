@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from soilml.numerics.quantiles import QuantileBand, quantile_band
-from soilml.traction.by_load import LoadPrediction, predictions_by_load
 from soilml.traction.draws import SoilDraws
-from soilml.traction.pull_and_slope import Traction, predict_traction
+from soilml.traction.pull_and_slope import (
+    LoadPrediction,
+    Traction,
+    predict_traction,
+    predictions_by_load,
+)
 from soilml.traction.report import PullReport, pull_report
 from soilml.traction.soil_draws import estimated_draws, posterior_draws, prior_draws
 

@@ -1,10 +1,11 @@
-"""Pull and slope from a case and a table of rows, with warnings and a picture."""
+"""Pull and slope of one gear from a case and a table of rows: prediction, columns, report."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,27 +13,39 @@ from soilml.arrays import Floats
 from soilml.config.given_case import GivenCase, as_case
 from soilml.fitting.operating_points import operating_points
 from soilml.io.read_table import Rows, as_table
+from soilml.numerics.quantiles import band_columns, quantile_band
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import COVARIATES
+from soilml.physics.pull_efficiency import traffic_class
 from soilml.physics.soils.gravity_law import GravityChange
-from soilml.quantities import column
+from soilml.quantities import NOT_IDENTIFIED_ABOVE, column
 from soilml.remarks import Remark
+from soilml.report.column_figure import column_picture
+from soilml.report.numbers import format_quantity, format_range, significant
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
-from soilml.traction.by_load import (
+from soilml.traction.draws import ON_SLOPES
+from soilml.traction.gravity import gravity_remark
+from soilml.traction.pull_and_slope import (
+    SAME_LOAD,
     LoadPrediction,
     MeasuredRange,
+    Traction,
+    excluded_effects,
     limitations,
     measured_loads,
     predictions_by_load,
     slip_grid,
 )
-from soilml.traction.gravity import gravity_remark
-from soilml.traction.model_errors import ON_SLOPES
-from soilml.traction.pull_and_slope import excluded_effects
 from soilml.traction.soil_draws import measured_soil, prior_draws
 
-if TYPE_CHECKING:
-    from soilml.report.report import Report
+STEP = 2  # Tables show every second slip
+_NOTATION = (
+    ("90 %", "from the 5 % to the 95 % quantile; medians before them."),
+    ("tractive efficiency", "power at the drawbar over that of the drive."),
+    ("pull efficiency", "share of the thrust that is left as pull; class by 35, 50, 65 %."),
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,17 +72,75 @@ class PullReport(Result):
     measured_pull: tuple[Floats, Floats, Floats]
     warnings: tuple[Remark, ...]
 
-    def report(self) -> Report:
-        """Largest pull and steepest slope under each load, their curves, and what limits them."""
-        from soilml.traction.presentation import report_of_pull
-
-        return report_of_pull(self)
+    @property
+    def vague(self) -> list[bool]:
+        """Whether largest pull and steepest slope of each load are no better known than before."""
+        return [
+            share > NOT_IDENTIFIED_ABOVE for o in self.by_load for share in o.remaining_fraction
+        ]
 
     def frame_columns(self) -> dict[str, Any]:
-        """A row for each load and slip: medians and ends of 90 % bands, SI units."""
-        from soilml.traction.presentation import pull_columns
+        """A row for each load and slip: medians and 90 % bands, what belongs to a load in all."""
+        parts = [_columns(one) for one in self.by_load]
+        return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
 
-        return pull_columns(self)
+    def report(self, title: str = "Drawbar pull and slope") -> Report:
+        """Largest pull and steepest slope under each load, their curves, and what limits them."""
+        loads, columns = self.by_load, self.frame_columns()
+        kept = [np.arange(len(one.posterior.slip)) % STEP == STEP - 1 for one in loads]
+        shown = np.flatnonzero(np.concatenate(kept))
+        tables = [_table_of_loads(loads)]
+        heads = {"Pull and slope": r"drawbar_pull_N|slope_rad"}
+        if any(one.posterior.most_efficient is not None for one in loads):
+            heads["Efficiency"] = r"tractive_efficiency|pull_efficiency|traffic_class\w*"
+        for head, names in heads.items():
+            of = re.compile(rf"(load_N|slip|{names})(_p05|_p95)?")
+            own = {n: np.asarray(v)[shown] for n, v in columns.items() if of.fullmatch(n)}
+            tables.append(ReportTable.of(head, own))
+        tables += [one.laws.table() for one in loads if one.laws is not None]
+        sentences = [_sentence(one) for one in loads]
+        under: dict[Remark, list[str]] = {}
+        for one in loads:
+            for remark in one.warnings:
+                under.setdefault(remark, []).append(significant(one.posterior.load))
+        remarks = [remark.under(f"{', '.join(names)} N: ") for remark, names in under.items()]
+        vague = self.vague
+        slips = format_range(*self.measured_range.slip, digits=2)
+        return Report(
+            kind="pull",
+            verdict=sentences[0],
+            lines=[*sentences[1:], *(_efficiency(loads[0].posterior) if len(loads) == 1 else ())],
+            tables=tables,
+            pictures=[self._picture(columns)],
+            remarks=[*remarks, *self.warnings],
+            next_steps=[
+                "measure a row at another load and slip: soilml plan next finds the best one"
+            ],
+            status="not known" if all(vague) else "partly known" if any(vague) else "predicted",
+            tone="warn" if any(vague) else "good",
+            title=title,
+            basis=f"{self.rows} row{'s'[: self.rows != 1]} at slips {slips}",
+            notation=_NOTATION,
+        )
+
+    def _picture(self, columns: dict[str, Any]) -> Picture:
+        slip, load, pull = self.measured_pull
+        if len(self.by_load) == 1:
+            near = np.abs(load / self.by_load[0].posterior.load - 1.0) < SAME_LOAD
+            slip, pull = slip[near], pull[near]
+        else:
+            columns = {name: values for name, values in columns.items() if "_prior" not in name}
+        slips = format_range(*self.measured_range.slip, digits=2)
+        return column_picture(
+            columns,
+            "slip",
+            [("drawbar_pull_N",), ("slope_rad",), ("tractive_efficiency", "pull_efficiency")],
+            ("load_N",) if len(self.by_load) > 1 else (),
+            title="Pull, slope and efficiency over slip",
+            caption="Lines: medians. Bands: 90 % of the soils that the rows allow; grey: of the "
+            f"prior. Points: measured pull. Slips {slips} were measured.",
+            measured={"slip": slip, "drawbar_pull_N": pull},
+        )
 
 
 def pull_report(
@@ -135,7 +206,7 @@ def pull_report(
     loads = measured_loads(table["load_N"]) if loads is None else loads
     slip = slip_grid(slip_limit, measured_range)
     before, error = prior_draws(unknown, case=case), None
-    errors = soil.errors(slip, _on_slopes(loads), ("drawbar_pull",))
+    errors = soil.errors(slip, [*loads, ON_SLOPES * min(loads)], ("drawbar_pull",))
     if errors is not None:
         draws, before = replace(draws, errors=errors[0]), replace(before, errors=errors[1])
         error = errors[1].amplitude("drawbar_pull")
@@ -157,6 +228,82 @@ def pull_report(
     )
 
 
-def _on_slopes(loads: Sequence[float]) -> list[float]:
-    """Loads with the smallest normal component on a slope that errors are asked for."""
-    return [*loads, ON_SLOPES * min(loads)]
+def _columns(one: LoadPrediction) -> dict[str, Any]:
+    known, prior = one.posterior, one.prior
+    count = len(known.slip)
+    columns = {"load_N": np.full(count, known.load), "slip": known.slip}
+    for name, values in (
+        ("drawbar_pull_N", known.pull),
+        ("slope_rad", known.slope),
+        ("largest_drawbar_pull_N", known.largest_pull),
+        ("best_slip", known.best_slip),
+        ("steepest_slope_rad", known.steepest_slope),
+        ("tractive_efficiency", known.tractive_efficiency),
+        ("pull_efficiency", known.pull_efficiency),
+        ("sinkage_m", known.sinkage),
+    ):
+        columns |= {k: np.broadcast_to(v, count) for k, v in band_columns(name, values).items()}
+    columns |= _classes(known)
+    before = quantile_band(prior.pull), quantile_band(prior.slope)
+    for name, found in zip(("drawbar_pull_N", "slope_rad"), before, strict=True):
+        columns[f"{name}_prior_p05"], columns[f"{name}_prior_p95"] = found.lower, found.upper
+    for name, share in zip(
+        ("largest_drawbar_pull", "steepest_slope"), one.remaining_fraction, strict=True
+    ):
+        columns[f"{name}_remaining_fraction"] = np.full(count, share)
+    return columns
+
+
+def _classes(known: Traction) -> dict[str, Any]:
+    """The traffic class of the median pull efficiency at each slip, and the soils that share it."""
+    middle = quantile_band(known.pull_efficiency).middle
+    usual, each = traffic_class(middle), traffic_class(known.pull_efficiency)
+    finite = np.isfinite(middle)
+    probability = np.where(finite, (each == usual).mean(axis=0), np.nan)
+    return {"traffic_class": np.where(finite, usual, ""), "traffic_class_probability": probability}
+
+
+def _sentence(one: LoadPrediction) -> str:
+    """Largest pull and steepest slope under a load, with 90 % bands where the rows tell them."""
+    known = one.posterior
+    unknown = {"N": "an unknown force", "rad": "an unknown slope"}
+    said = [
+        unknown[unit] if share > NOT_IDENTIFIED_ABOVE else quantile_band(draws).text(unit)
+        for draws, unit, share in zip(
+            (known.largest_pull, known.steepest_slope), unknown, one.remaining_fraction, strict=True
+        )
+    ]
+    return f"At {significant(known.load)} N the wheel pulls {said[0]} at most and climbs {said[1]}."
+
+
+def _efficiency(known: Traction) -> Iterator[str]:
+    """Both efficiencies, and the class, where the drive is used best."""
+    i = known.most_efficient
+    if i is None:
+        return
+    tractive, pull = (
+        quantile_band(v[:, i]).text(digits=2)
+        for v in (known.tractive_efficiency, known.pull_efficiency)
+    )
+    where = f"{known.slip[i]:.2g}"
+    yield f"Tractive efficiency is best at slip {where}: {tractive}; pull efficiency {pull}."
+    found = _classes(known)
+    share = format_quantity(float(found["traffic_class_probability"][i]), "share", digits=2)
+    yield f"Traffic class there: {found['traffic_class'][i]}, on {share} of the soils."
+
+
+def _table_of_loads(loads: Sequence[LoadPrediction]) -> ReportTable:
+    known = [one.posterior for one in loads]
+    pulls = [quantile_band(one.prior.largest_pull) for one in loads]
+    return ReportTable(
+        "By load",
+        [
+            Column("load", [one.load for one in known], "N"),
+            Column.of_bands("largest pull", [quantile_band(k.largest_pull) for k in known], "N"),
+            Column.of_bands(
+                "steepest slope", [quantile_band(k.steepest_slope) for k in known], "rad"
+            ),
+            Column.of_bands("at slip", [quantile_band(k.best_slip) for k in known], digits=2),
+            Column.of_bands("pull before the rows", pulls, "N"),
+        ],
+    )

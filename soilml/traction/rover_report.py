@@ -1,11 +1,11 @@
-"""A rover's performance on the soil of measured rows, with warnings and a picture."""
+"""A rover's performance on the soil of measured rows: prediction, columns, report."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,12 +16,16 @@ from soilml.config.wheeled_rover import GRAVITY
 from soilml.errors import InputError
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.read_table import Rows, as_table
+from soilml.numerics.quantiles import band_columns, quantile_band
 from soilml.onboard.estimator import Estimator
 from soilml.physics.soils.gravity_law import GravityChange
 from soilml.quantities import column
 from soilml.remarks import Remark
+from soilml.report.column_figure import column_picture
+from soilml.report.numbers import format_quantity, format_range
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
-from soilml.traction.by_load import LOAD_FACTOR, SLIP_MARGIN, MeasuredRange, slip_grid
 from soilml.traction.draws import DrawnErrors, SoilDraws
 from soilml.traction.gravity import (
     LawComparison,
@@ -29,13 +33,17 @@ from soilml.traction.gravity import (
     draws_at_gravity,
     gravity_remark,
 )
-from soilml.traction.pull_and_slope import excluded_effects
+from soilml.traction.pull_and_slope import (
+    LOAD_FACTOR,
+    SLIP_MARGIN,
+    MeasuredRange,
+    excluded_effects,
+    slip_grid,
+)
 from soilml.traction.rover_performance import LARGEST_SLOPE, RoverPerformance, rover_performance
 from soilml.traction.soil_draws import measured_soil, prior_draws
 
-if TYPE_CHECKING:
-    from soilml.report.report import Report
-
+FEWEST = 0.5  # Share of draws that climb a slope below which nothing is said of the slip there
 SLOPES = np.deg2rad([0.0, 5.0, 10.0, 15.0, 20.0])  # Slopes that are looked at by default, rad
 #: Gravity, m/s^2, and relative difference from it, from which on it is not the Earth's.
 EARTH, OTHER_GRAVITY = GRAVITY["earth"], 0.02
@@ -52,17 +60,47 @@ class RoverReport(Result):
     warnings: tuple[Remark, ...]
     laws: LawComparison | None = None  # By each law of gravity, where that is in doubt
 
-    def report(self) -> Report:
-        """The steepest slope, slip and work by slope, wheels, and what limits them."""
-        from soilml.traction.rover_presentation import report_of_rover
-
-        return report_of_rover(self)
-
     def frame_columns(self) -> dict[str, Any]:
         """A row for each slope: medians and ends of 90 % bands, SI units."""
-        from soilml.traction.rover_presentation import rover_columns
+        own = self.performance
+        columns: dict[str, Any] = {"slope_rad": own.slope, "probability_climbed": own.climbed}
+        for name, draws in (
+            ("slip", own.slip),
+            ("margin_N", own.margin),
+            ("energy_J_per_m", own.energy),
+            ("steepest_slope_rad", own.steepest_slope[:, None] + 0.0 * own.slope),
+        ):
+            columns |= band_columns(name, draws)
+        for name in own.loads:
+            columns[f"load_N_{name}"] = own.loads[name]
+            columns[f"torque_Nm_{name}"] = quantile_band(own.torque[name]).middle
+            columns[f"sinkage_m_{name}"] = quantile_band(own.sinkage[name]).middle
+        return columns
 
-        return rover_columns(self)
+    def report(self, title: str = "Rover on slopes") -> Report:
+        """The steepest slope, slip and work by slope, wheels, and what limits them."""
+        own = self.performance
+        still = float(np.mean(~np.isfinite(own.steepest_slope)))
+        slips = format_range(*self.measured_range.slip, digits=2)
+        loads = format_range(*self.measured_range.load)
+        return Report(
+            kind="pull",
+            verdict=_verdict(self, still),
+            lines=list(_lines(self, still)),
+            tables=[_slopes(self), *_wheels(self), *([self.laws.table()] if self.laws else [])],
+            pictures=[_picture(self)],
+            remarks=self.warnings,
+            next_steps=["stay below the lower end of the band, or measure rows that narrow it"],
+            status="does not move" if still > FEWEST else "moves",
+            tone="bad" if still > FEWEST else "good",
+            title=title,
+            basis=f"{self.rows} rows at slips {slips}, loads {loads} N; {len(own.loads)} wheels",
+            notation=[
+                ("90 %", "from the 5 % to the 95 % quantile; medians before them."),
+                ("climbed", "share of the soils, which the rows allow, that the rover climbs."),
+                ("margin", "largest pull less the weight along the slope."),
+            ],
+        )
 
 
 def rover_report(
@@ -198,4 +236,77 @@ def _warnings(
         f"bands include {included}; all wheels driven at one slip, loads of equally stiff wheels, "
         "no side slope",
         severity="note",
+    )
+
+
+def _verdict(found: RoverReport, still: float) -> str:
+    if still > FEWEST:
+        share = format_quantity(still, "share", digits=2)
+        return f"The rover does not move: {share} of the soils do not let it."
+    own = found.performance
+    steepest = quantile_band(own.steepest_slope).text("rad")
+    return f"The rover climbs {steepest} at slips up to {own.slip_limit:.2g}."
+
+
+def _lines(found: RoverReport, still: float) -> Iterator[str]:
+    if still > FEWEST:
+        return
+    yield f"The best slip on level ground is {quantile_band(found.performance.best_slip).text()}."
+    if np.isfinite(found.prior_steepest).any():
+        before = quantile_band(found.prior_steepest).text("rad")
+        yield f"Before the rows, the steepest slope was {before}."
+    if still > 0.0:
+        share = format_quantity(still, "share", digits=2)
+        yield f"{share} of the soils do not let the rover move."
+
+
+def _slopes(found: RoverReport) -> ReportTable:
+    own, enough = found.performance, found.performance.climbed >= FEWEST
+    slip, margin, work = (quantile_band(v) for v in (own.slip, own.margin, own.energy))
+    blank = np.where(enough, 0.0, np.nan)
+    columns = [
+        Column("slope", own.slope.tolist(), "rad", digits=3),
+        Column("climbed", own.climbed.tolist(), "share", digits=3),
+    ]
+    for head, band, unit, hidden in (
+        ("slip", slip, "1", blank),
+        ("margin", margin, "N", 0.0),
+        ("work", work, "J/m", blank),
+    ):
+        ends = ((band.lower + hidden).tolist(), (band.upper + hidden).tolist())
+        columns.append(Column(head, (band.middle + hidden).tolist(), unit, ends=ends))
+    return ReportTable("Slopes", columns)
+
+
+def _wheels(found: RoverReport) -> Iterator[ReportTable]:
+    """Loads, torques and sinkages on the steepest of the slopes that most draws climb."""
+    own = found.performance
+    climbed = np.flatnonzero(own.climbed >= FEWEST)
+    if not climbed.size:
+        return
+    at = int(climbed[-1])
+    torque = [quantile_band(own.torque[name][:, at]) for name in own.loads]
+    sinkage = [quantile_band(own.sinkage[name][:, at]) for name in own.loads]
+    yield ReportTable(
+        f"Wheels on {format_quantity(float(own.slope[at]), 'rad')}",
+        [
+            Column("wheel", list(own.loads)),
+            Column("pass", [own.passes[name] for name in own.loads]),
+            Column("load", [float(load[at]) for load in own.loads.values()], "N"),
+            Column.of_bands("torque", torque, "N m"),
+            Column.of_bands("sinkage", sinkage, "m"),
+        ],
+    )
+
+
+def _picture(found: RoverReport) -> Picture:
+    enough = found.performance.climbed >= FEWEST
+    columns = {n: np.where(enough | n.startswith(("slope", "prob", "margin")), values, np.nan)
+               for n, values in found.frame_columns().items()}  # fmt: skip
+    return column_picture(
+        columns,
+        "slope_rad",
+        [("slip",), ("margin_N",), ("energy_J_per_m",), ("probability_climbed",)],
+        title="The rover on slopes",
+        caption="Lines: medians. Bands: 90 % of the soils that the rows allow.",
     )

@@ -45,9 +45,8 @@ from soilml.numerics.resampling import systematic_resampling
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
 from soilml.remarks import Remark
-from soilml.traction.draws import DrawnErrors, SoilDraws
+from soilml.traction.draws import DrawnErrors, SoilDraws, draw_model_errors
 from soilml.traction.mixture_draws import posterior_draws_of
-from soilml.traction.model_errors import draw_model_errors
 
 #: Where the soil of rows is drawn without a remainder that was learned from them.
 DRAWN_WITHOUT = Remark(

@@ -83,9 +83,10 @@ def test_the_board_abstains_with_numpy_and_onnxruntime_alone(folder, small_model
         "            raise ImportError('no ' + name)\n"
         "sys.meta_path.insert(0, No())\n"
         "import argparse\n"
+        "from soilml.cli import options\n"
         "from soilml.cli.commands import estimate\n"
         "parser = argparse.ArgumentParser()\n"
-        "estimate.add_arguments(parser)\n"
+        "options.declare(parser, estimate.ARGUMENTS)\n"
         "estimate.run(parser.parse_args())\n"
     )
     command = [sys.executable, "-c", code, str(small_model), "runs.csv", "--by", "run"]

@@ -9,7 +9,7 @@ import pytest
 from soilml.cli import main
 from soilml.io.text_tables import csv_text
 from soilml.systems.rim_stress import SimulatedRover
-from soilml.systems.rim_stress.tables import climb_tables
+from soilml.systems.rim_stress.simulation import climb_tables
 
 ROVER = """\
 [rover]
@@ -53,11 +53,10 @@ def folder(tmp_path, tables, monkeypatch):
 
 @pytest.mark.slow
 def test_the_interval_contains_the_steepest_slope(folder, true, capsys):
-    assert main([*COMMAND, "--slip-limit", "0.3", "--format", "json"]) == 0
+    assert main([*COMMAND, "--format", "json"]) == 0
     found = json.loads(capsys.readouterr().out)
     best = found["steepest_slope_rad"]
     assert best["p05"] - 0.01 < true.steepest < best["p95"] + 0.01
-    assert found["steepest_slope_within_slip_limit_rad"]["median"] < best["median"]
     modulus = found["ground"]["parameters"]["shear_modulus"]
     assert abs(modulus["value"] - true.shear[2]) < 3.5 * modulus["std"]
     assert found["ground"]["given"]["cohesion"] == 0.0
@@ -164,7 +163,7 @@ def test_invalid_tables_are_refused_in_one_line(folder, tables, capsys, fault):
 
 ROVER_FAULTS = {
     "degrees": (ROVER.replace("0.6632", "38"), "if 38 are degrees, write 0.6632"),
-    "half a centre of mass": (ROVER.replace("height_ratio = 0.4", ""), "belong together"),
+    "half a centre of mass": (ROVER.replace("height_ratio = 0.4", ""), "height_ratio"),
     "number and range": (
         ROVER.replace("[soil.prior]", "[soil.prior]\ncohesion = [0.0, 9.0]"),
         "remove one of them",

@@ -16,7 +16,6 @@ TYPED = {
     "soilml show effects slip-s": "slip-scale slip-sinkage",
     "soilml estimate wheel_l": "wheel_linear wheel_lssvm",
     "soilml pull m.toml r.csv --gravity m": "moon mars",
-    "soilml estimate wheel r.csv --rule co": "correlated covariance-intersection",
     "soilml setup completion f": "fish",
     "soilml identify mo": "model.toml",
     "soilml gap model.toml r.csv --ignore-extra --out mo": "model.toml",

@@ -10,9 +10,8 @@ from conftest import THREE_CHANNEL_MODEL
 
 from soilml.cli import main
 from soilml.cli.main import parser
-from soilml.cli.option_values import NumberFrom, number, slip_limit, whole_number
+from soilml.cli.option_values import NumberFrom
 from soilml.cli.options import leaves
-from soilml.serve.command import port_number
 
 HOSTILE = ["nan", "inf", "-inf", "0", "-1", "1e-9", "1e9", "-1e9", "1e400", "x", ""]
 #: Options whose text holds numbers, which their command reads.
@@ -41,20 +40,12 @@ def options():
                 yield command, action
 
 
-NUMBERS = [
-    (words, action)
-    for words, action in options()
-    if isinstance(action.type, NumberFrom)
-    or action.type in (slip_limit, port_number)
-    or getattr(action.type, "__qualname__", "").startswith("whole_number_from")
-]
+NUMBERS = [(words, action) for words, action in options() if isinstance(action.type, NumberFrom)]
 
 
 def test_no_option_is_a_number_without_a_range():
-    free = [(w, a.option_strings) for w, a in options() if a.type in (int, float, number)]
+    free = [(w, a.option_strings) for w, a in options() if a.type in (int, float)]
     assert not free and len(NUMBERS) > 40
-    # of `generate`, whose recipe bounds the rows and whose seed may be any
-    assert {w for w, a in options() if a.type is whole_number} == {"generate"}
 
 
 @pytest.mark.parametrize("text", HOSTILE)
@@ -69,8 +60,7 @@ def test_a_number_beyond_its_range_is_refused_in_one_line(text):
                 assert "\n" not in str(error) and "needed is" in str(error), (words, action)
                 continue
             assert np.isfinite(value), (words, action.option_strings)
-            if isinstance(action.type, NumberFrom):
-                assert action.type.lower <= value <= action.type.upper
+            assert action.type.lower <= value <= action.type.upper
 
 
 @pytest.fixture(scope="module")

@@ -124,15 +124,8 @@ def test_files_that_read_the_same_are_not_fused_as_if_they_erred_independently(t
     log = tmp_path / "log.csv"
     log.write_text("run,slip,load_N,torque_Nm\na,0.2,60,2.1\n")
     command = ["estimate", str(exported / "wheel.onnx"), str(log)]
-    twin = [*command, "--with", str(exported / "wheel.onnx")]
-    for extra in ([], ["--rule", "pairwise"], ["--rule", "inverse-variance"]):
-        assert main([*twin, *extra]) == 2
-        assert "their errors are not independent" in capsys.readouterr().err
-    assert main([*twin, "--rule", "covariance-intersection"]) == 0
-    fused = capsys.readouterr().out.splitlines()[1].split(",")
-    assert main(command) == 0
-    one = capsys.readouterr().out.splitlines()[1].split(",")
-    assert float(fused[5]) == pytest.approx(float(one[5]), rel=1e-4)
+    assert main([*command, "--with", str(exported / "wheel.onnx")]) == 2
+    assert "their errors are not independent" in capsys.readouterr().err
 
 
 def test_every_argument_that_names_an_input_file_is_declared_as_one():

@@ -66,18 +66,6 @@ def test_former_options_lead_to_present_ones(command):
         assert main([*command.split(), old, "x", new, "y"]) == 2
 
 
-def test_former_orders_of_arguments_lead_to_present_ones():
-    for words in (["drive.csv", "--rover", "r.toml"], ["--rover=r.toml", "drive.csv"]):
-        assert old_spellings.present_words(["slip", *words]) == [
-            "drive",
-            "slip",
-            "r.toml",
-            "drive.csv",
-        ]
-    found = old_spellings.present_words(["export-fusion", "o.c", "a.onnx", "b.onnx"])
-    assert found == ["export", "fusion", "a.onnx", "b.onnx", "o.c"]
-
-
 def test_hints_at_former_words_are_for_a_terminal(monkeypatch, capsys):
     old_spellings.present_words(["advise", "--loads", "3"])
     assert capsys.readouterr().err == ""

@@ -86,7 +86,6 @@ def test_each_small_run_is_of_a_script_of_a_page_and_is_recorded():
 LONG = (
     "python -m soilml paper numbers --summary",
     "python -m soilml pull examples/rover/rover.toml examples/rover/runs.csv --out build/rover.csv",
-    "python examples/import/wheel_leg.py",
     "python examples/map/compare.py",
 )
 

@@ -1,30 +1,29 @@
 """Every printed number of the source papers is what its row claims."""
 
-import csv
 import dataclasses
 import importlib
 import math
 import re
 import sys
-from importlib import resources
 from pathlib import Path
 
 import pytest
 
 from soilml.cli import main
 from soilml.papers.published import (
+    CHAPTERS,
     COLUMNS,
     ORDINAL,
     PAPERS,
     STATUSES,
     Comparison,
-    chapters,
     count_statuses,
     printed_numbers,
+    read_chapter,
 )
 
 ROWS = list(printed_numbers())
-CHAPTERS = [chapter for name in PAPERS for chapter in chapters(name)]
+EVERY = [chapter for name in PAPERS for chapter in CHAPTERS.get(name, (name,))]
 
 
 #: Comparisons that agree with what the rows claim, without computing.
@@ -82,10 +81,9 @@ def test_the_page_has_the_counts_of_the_rows():
         assert [int(n) for n in line.removeprefix(STATUSES[code]).split()] == [*each, sum(each)]
 
 
-@pytest.mark.parametrize("chapter", CHAPTERS)
+@pytest.mark.parametrize("chapter", EVERY)
 def test_a_chapter_is_complete(chapter):
-    text = resources.files("soilml.papers").joinpath(f"{chapter}.csv").read_text("utf-8")
-    entries = list(csv.DictReader(text.splitlines()))
+    entries = read_chapter(chapter)
     keys = [entry["key"] for entry in entries]
     assert len(set(keys)) == len(keys)
     assert set(importlib.import_module(f"soilml.papers.{chapter}").COMPUTED) <= set(keys)
@@ -108,4 +106,3 @@ def test_the_terminal_shows_computed_numbers_and_the_others_by_reason(monkeypatc
     assert all(f"{row.what} ({row.source})" in some for row in computed)
     given = [row for row in rows if row.claimed == "given"]
     assert f"{len(given)} given, kept as printed: wheel radius, " in short.out
-    assert f"{sum(not row.counted_with for row in given)} given" in short.err

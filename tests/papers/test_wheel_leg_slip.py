@@ -11,8 +11,7 @@ from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.onboard.fusion_rules import pairwise
 from soilml.papers.comin2017_slip import FOOT
-from soilml.systems.wheel_legs.geometry import wheel_leg
-from soilml.systems.wheel_legs.resistive_force import GROUNDS
+from soilml.systems.wheel_legs.resistive_force import GROUNDS, wheel_leg
 from soilml.systems.wheel_legs.walk import walk
 
 SAND = soil("comin2017/ssc-2", shear_modulus=0.017 * FOOT.area**0.5)

@@ -15,7 +15,7 @@ from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.fitting.readings import stack_readings, typical_std
 from soilml.gap.checks import estimate_repeat_noise
-from soilml.gap.evidence.holdout_split import RUNS_PER_HELD_OUT, split_holdout
+from soilml.gap.held_out import RUNS_PER_HELD_OUT, split_holdout
 from soilml.io.table import Table
 from soilml.physics.gears.emulated import EmulatedGear
 from soilml.quantities import SHEAR, column

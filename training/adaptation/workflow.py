@@ -19,9 +19,9 @@ from soilml.config.explanations import likeliest_with_effects
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.gap import GapReport, gap
-from soilml.gap.evidence.holdout_split import RUNS_PER_HELD_OUT
-from soilml.gap.report.report import gap_files
-from soilml.gap.verdict.decision import OUTSIDE_PRIORS
+from soilml.gap.disagreements import OUTSIDE_PRIORS
+from soilml.gap.held_out import RUNS_PER_HELD_OUT
+from soilml.gap.report import gap_files
 from soilml.identification.model_error_inputs import with_exact_model
 from soilml.identification.trained_estimator import estimators_for_case, with_sensors_of
 from soilml.io.atomic_files import atomic_outputs, create_folder, save_text, write_files

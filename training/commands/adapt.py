@@ -6,14 +6,7 @@ import argparse
 from pathlib import Path
 
 from soilml.cli.option_values import whole_number_from
-from soilml.cli.options import (
-    InputFile,
-    add_ignore_extra_option,
-    add_model_and_runs,
-    add_seed_option,
-    add_workers_option,
-    folder_outputs,
-)
+from soilml.cli.options import REQUIRED, InputFile, folder_outputs
 from soilml.errors import InputError
 
 DESCRIPTION = """\
@@ -50,34 +43,17 @@ FILES = (
 LEAST_ROWS, MOST_ROWS = 2000, 10**9  # Synthetic rows of a file
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add_model_and_runs(parser)
-    parser.add_argument("-o", "--out", metavar="FOLDER", required=True, help="folder for all files")
-    parser.add_argument(
-        "--suspected",
-        action="store_true",
-        help="add the first suspect where the evidence names none, and it predicts better",
-    )
-    parser.add_argument(
-        "--against",
-        type=InputFile,
-        metavar="FILE.onnx",
-        help="compare with this model file, and train none on the model as it was",
-    )
-    parser.add_argument(
-        "--truth", type=InputFile, metavar="TRUE.toml", help="file with the known soil in [soil]"
-    )
-    parser.add_argument(
-        "--rows",
-        type=whole_number_from(LEAST_ROWS, MOST_ROWS),
-        default=40_000,
-        metavar="N",
-        help="synthetic rows that each file is trained on (default: 40000)",
-    )
-    add_seed_option(parser)
-    add_workers_option(parser)
-    add_ignore_extra_option(parser)
+ARGUMENTS = (
+    "model-and-runs",
+    ("--out FOLDER", "folder for all files", REQUIRED),
+    ("--suspected", "add the first suspect where the evidence names none, and it predicts better"),
+    ("--against FILE.onnx", "file to compare with, in place of one trained anew", InputFile),
+    ("--truth TRUE.toml", "file with the known soil in [soil]", InputFile),
+    ("--rows N (40000)", "of each file's training", whole_number_from(LEAST_ROWS, MOST_ROWS)),
+    "seed",
+    "workers",
+    "ignore-extra",
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

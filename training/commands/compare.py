@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from soilml.cli.option_values import whole_number_from
-from soilml.cli.options import InputFile, add_workers_option, folder_outputs
+from soilml.cli.options import ANY, InputFile, folder_outputs
 from soilml.errors import InputError
 
 FILES = ("report.html", "compare.json", "compare.csv", "compare.png")
@@ -42,33 +42,13 @@ Writes report.html (start here), compare.json, compare.csv and compare.png.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "files",
-        type=InputFile,
-        metavar="FILE",
-        nargs="*",
-        help="MODEL.onnx ..., or MODEL.toml TEST.parquet MODEL.onnx ... "
-        "(default: the released models)",
-    )
-    parser.add_argument(
-        "-o", "--out", metavar="FOLDER", help=f"output folder (default for the benchmark: {FOLDER})"
-    )
-    parser.add_argument(
-        "--sets",
-        type=whole_number_from(1),
-        metavar="N",
-        help="use only the first N sets of each size",
-    )
-    parser.add_argument(
-        "--analytic-sets",
-        type=whole_number_from(1),
-        metavar="N",
-        help="number of sets of each size for the analytic methods (default: up to 120, as many as "
-        "they do in a minute or two)",
-    )
-    add_workers_option(parser)
+ARGUMENTS = (
+    ("files FILE", "MODEL.onnx ..., or MODEL.toml TEST.parquet MODEL.onnx ...", InputFile, ANY),
+    ("--out FOLDER", f"output folder (default for the benchmark: {FOLDER})"),
+    ("--sets N", "use only the first N sets of each size", whole_number_from(1)),
+    ("--analytic-sets N", "sets of each size for the analytic methods", whole_number_from(1)),
+    "workers",
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

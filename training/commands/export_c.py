@@ -35,24 +35,12 @@ MOST_ROWS = 4096
 LEAST_LENGTH = 16  # Fewest rows that a tracker remembers
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="a model file")
-    parser.add_argument("out", metavar="OUT.c", help="C file to write; OUT.h is written beside it")
-    parser.add_argument(
-        "--step-rows",
-        type=whole_number_from(1, MOST_ROWS),
-        default=32,
-        metavar="N",
-        help="rows that one step of a set takes at most; working memory grows with it (default 32)",
-    )
-    parser.add_argument(
-        "--length",
-        type=whole_number_from(LEAST_LENGTH, MOST_ROWS),
-        default=100,
-        metavar="N",
-        help="rows that a tracker remembers; its memory grows with it (default 100)",
-    )
+ARGUMENTS = (
+    ("model MODEL.onnx", "a model file", InputFile),
+    ("out OUT.c", "C file to write; OUT.h is written beside it"),
+    ("--step-rows N (32)", "rows of one step at most", whole_number_from(1, MOST_ROWS)),
+    ("--length N (100)", "rows of a tracker", whole_number_from(LEAST_LENGTH, MOST_ROWS)),
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

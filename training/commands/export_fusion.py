@@ -24,16 +24,11 @@ their errors, which are in the files. docs/how-to/deploy.md describes it.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "model",
-        type=InputFile,
-        nargs=2,
-        metavar="MODEL.onnx",
-        help="two model files, named as the C files that export c writes for them",
-    )
-    parser.add_argument("out", metavar="OUT.c", help="C file to write; OUT.h is written beside it")
+ARGUMENTS = (
+    ("first FIRST.onnx", "a model file, named as its C file", InputFile),
+    ("second SECOND.onnx", "the other one", InputFile),
+    ("out OUT.c", "C file to write; OUT.h is written beside it"),
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -51,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.onboard.model_file import find_model
     from training.export_c.fusion import write_fusion
 
-    out, files = Path(args.out), [find_model(model) for model in args.model]
+    out, files = Path(args.out), [find_model(model) for model in (args.first, args.second)]
     for name in (out, *(file.with_suffix(".c") for file in files)):
         check_c_name(name)
     estimators = [Estimator.load(file) for file in files]

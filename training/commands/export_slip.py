@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from soilml.cli.option_values import NumberFrom, whole_number_from
-from soilml.cli.options import InputFile, add_effects_option, add_output
+from soilml.cli.options import InputFile, OutputFile
 from soilml.io.atomic_files import output_files
 
 DESCRIPTION = """\
@@ -25,20 +25,14 @@ SOILS = 1024
 STEEPEST = 25.0  # Degrees; pitch to either side for which loads are tabulated
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("rover", type=InputFile, metavar="ROVER.toml", help="rover and prior")
-    add_output(parser, "out", "OUT.onnx", "file to write")
-    parser.add_argument("--c", metavar="OUT.c", help="C file to write too; OUT.h is beside it")
-    parser.add_argument(
-        "--draws", type=whole_number_from(32, 16384), default=SOILS, metavar="N",
-        help=f"draws of the prior that stand for all soils (default: {SOILS})",
-    )  # fmt: skip
-    parser.add_argument(
-        "--least-speed", type=NumberFrom(1e-4, 10.0, "m/s"), default=0.005, metavar="M/S",
-        help="speed of a rim below which the wheel stands (default: 0.005)",
-    )  # fmt: skip
-    add_effects_option(parser)
+ARGUMENTS = (
+    ("rover ROVER.toml", "rover and prior", InputFile),
+    ("out OUT.onnx", "file to write", OutputFile),
+    ("--c OUT.c", "C file to write too; OUT.h is beside it"),
+    (f"--draws N ({SOILS})", "draws of the prior", whole_number_from(32, 16384)),
+    ("--least-speed M/S (0.005)", "of a rim that turns", NumberFrom(1e-4, 10.0, "m/s")),
+    "effects",
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

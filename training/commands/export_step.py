@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from soilml.cli.option_values import whole_number_from
-from soilml.cli.options import InputFile, add_output
+from soilml.cli.options import InputFile, OutputFile
 
 DESCRIPTION = """\
 Write the set posterior of MODEL.onnx as OUT.onnx, in which every shape is a
@@ -20,17 +20,11 @@ uses MODEL.onnx itself; soilml export c writes C that needs no library.
 MOST_ROWS = 4096  # Rows that one step may take
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="a model file")
-    add_output(parser, "out", "OUT.onnx", "file to write")
-    parser.add_argument(
-        "--step-rows",
-        type=whole_number_from(1, MOST_ROWS),
-        default=1,
-        metavar="N",
-        help="rows that each step takes (default 1)",
-    )
+ARGUMENTS = (
+    ("model MODEL.onnx", "a model file", InputFile),
+    ("out OUT.onnx", "file to write", OutputFile),
+    ("--step-rows N (1)", "rows that each step takes", whole_number_from(1, MOST_ROWS)),
+)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from soilml.cli.options import InputFile, add_workers_option
+from soilml.cli.options import OPTIONAL, InputFile
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
 
@@ -41,23 +41,12 @@ command writes the model card OUT.md. A spec contains
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "spec",
-        type=InputFile,
-        metavar="SPEC.toml",
-        help="spec file, or the name of a packaged spec",
-    )
-    parser.add_argument(
-        "data",
-        type=InputFile,
-        metavar="DATA.parquet",
-        nargs="?",
-        help="data written by soilml generate, or measured",
-    )
-    parser.add_argument("out", metavar="OUT.onnx", help="model file to write")
-    add_workers_option(parser)
+ARGUMENTS = (
+    ("spec SPEC.toml", "spec file, or the name of a packaged spec", InputFile),
+    ("data DATA.parquet", "data written by soilml generate, or measured", InputFile, OPTIONAL),
+    ("out OUT.onnx", "model file to write"),
+    "workers",
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

@@ -49,10 +49,28 @@ class Graph:
         self._names_of_constants: dict[tuple[Any, ...], str] = {}
         self._names_of_nodes: dict[tuple[Any, ...], list[str]] = {}
         self.functions: dict[str, Any] = {} if functions is None else functions
+        self._domains: dict[str, int] = {}
 
     def branch(self, prefix: str) -> Graph:
         """A graph for one branch of this one."""
-        return Graph(prefix, self.functions)
+        made = Graph(prefix, self.functions)
+        made._domains = self._domains
+        return made
+
+    def inline(self, model: Any, given: str) -> str:
+        """Add the nodes of a model of one input, which reads `given`; its first output's name.
+
+        Operators of further domains are then needed to run the graph.
+        """
+        from onnx import compose
+
+        prefix = f"{self._prefix}m{len(self._nodes)}_"
+        graph = compose.add_prefix(model, prefix).graph
+        self.op("Identity", given, out=graph.input[0].name)
+        self._nodes.extend(graph.node)
+        self._constants.extend(graph.initializer)
+        self._domains |= {o.domain: o.version for o in model.opset_import if o.domain}
+        return str(graph.output[0].name)
 
     def constant(self, value: Any, exact: bool = False, name: str = "") -> str:
         """The name of a constant array; floating-point numbers become float64 unless `exact`.
@@ -235,7 +253,8 @@ class Graph:
     @property
     def opsets(self) -> list[tuple[str, int]]:
         """Operator sets of the model."""
-        return [("", OPSET), *([(DOMAIN, 1)] if self.functions else [])]
+        own = [(DOMAIN, 1)] if self.functions else []
+        return [("", OPSET), *own, *sorted(self._domains.items())]
 
     def model(
         self, inputs: Sequence[str] | Mapping[str, list[Any]], outputs: Mapping[str, Output]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -42,20 +42,29 @@ class LinearGaussian(GaussianRegressor):
         self.ridge = ridge
 
     def _fit_standardised(self, x: Floats, z: Floats, groups: Groups, progress: Progress) -> None:
+        self.weights_, self.bias_ = self._ridge(x, z)
+        self.fit_log_variance(x, z - x @ self.weights_ - self.bias_)
+
+    def fit_log_variance(self, x: Floats, residual: Floats) -> Self:
+        """Fit the log-variance alone, to residuals (n, q) of another mean."""
+        found = self._ridge(x, log_squared_residuals(residual))
+        self.log_variance_weights_, self.log_variance_bias_ = found
+        return self
+
+    def log_variance(self, x: Floats) -> Floats:
+        """Log-variance (n, q) of standardised rows."""
+        return np.asarray(x @ self.log_variance_weights_ + self.log_variance_bias_)
+
+    def _ridge(self, x: Floats, z: Floats) -> tuple[Floats, Floats]:
+        """Weights (d, q) and bias (q,) of a ridge regression."""
+        centre, bias = x.mean(axis=0), z.mean(axis=0)
         normal = x.T @ x + self.ridge * len(x) * np.eye(x.shape[1])
-        self.bias_, centre = z.mean(axis=0), x.mean(axis=0)
         normal -= len(x) * np.outer(centre, centre)
-        self.weights_ = np.linalg.solve(normal, (x - centre).T @ z)
-        self.bias_ = self.bias_ - centre @ self.weights_
-        logs = log_squared_residuals(z - x @ self.weights_ - self.bias_)
-        self.log_variance_weights_ = np.linalg.solve(normal, (x - centre).T @ logs)
-        self.log_variance_bias_ = logs.mean(axis=0) - centre @ self.log_variance_weights_
+        weights = np.linalg.solve(normal, (x - centre).T @ z)
+        return weights, bias - centre @ weights
 
     def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
-        return (
-            x @ self.weights_ + self.bias_,
-            x @ self.log_variance_weights_ + self.log_variance_bias_,
-        )
+        return x @ self.weights_ + self.bias_, self.log_variance(x)
 
     def _add_standardised_outputs(self, graph: Graph, x: str) -> tuple[str, str]:
         mean = graph.affine(x, self.weights_, self.bias_)

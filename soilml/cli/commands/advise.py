@@ -5,16 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.option_values import NumberFrom, slip_limit, whole_number_from
-from soilml.cli.options import (
-    add_effects_option,
-    add_exact_model_option,
-    add_gravity_options,
-    add_model_and_runs,
-    add_output,
-    add_row_options,
-    gravity_change,
-)
+from soilml.cli.option_values import SLIP, NumberFrom, whole_number_from
+from soilml.cli.options import OutputFile, gravity_change
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -72,44 +64,23 @@ TRANSFER = {
 }
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add_model_and_runs(parser, need_runs=False)
-    parser.add_argument(
-        "--slip",
-        dest="slips",
-        metavar="S,...",
-        help="candidate slips: A,B,... or start:stop:count",
-    )
-    parser.add_argument("--load", dest="loads", metavar="N,...", help="candidate loads in N")
-    parser.add_argument(
-        "--count",
-        type=whole_number_from(1, MAX_COUNT),
-        metavar="N",
-        help="number of rows in the planned sequence, 1 to 5 (default: 3)",
-    )
-    parser.add_argument(
-        "--free", metavar="A,B,...", help="parameters to identify (default: those with a prior)"
-    )
-    parser.add_argument("--all", action="store_true", help="list every candidate, best first")
-    add_gravity_options(parser)
-    parser.add_argument(
-        "--target-load",
-        type=NumberFrom(1e-3, 1e6, "N"),
-        metavar="N",
-        help="with --gravity: load of the wheel there (default: mean of [rover])",
-    )
-    parser.add_argument(
-        "--target-slip", type=slip_limit, metavar="S", help="slip of the pull there (default: 0.3)"
-    )
-    parser.add_argument("--radius", metavar="M,...", help="further wheel radii of tests in m")
-    add_effects_option(parser)
-    add_exact_model_option(parser)
-    add_row_options(parser)
-    add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_output(
-        parser, "--picture", "FILE.png", "draw maps of the expected width over slip and load"
-    )
+ARGUMENTS = (
+    "model-and-any-runs",
+    ("--slip S,...", "candidate slips: A,B,... or start:stop:count"),
+    ("--load N,...", "candidate loads in N"),
+    ("--count N", "rows of the planned sequence (default: 3)", whole_number_from(1, MAX_COUNT)),
+    "free",
+    ("--all", "list every candidate, best first"),
+    "gravity",
+    ("--target-load N", "of the wheel there (default: [rover])", NumberFrom(1e-3, 1e6, "N")),
+    ("--target-slip S", "slip of the pull there (default: 0.3)", SLIP),
+    ("--radius M,...", "further wheel radii of tests in m"),
+    "effects",
+    "exact-model",
+    "rows",
+    ("--out FILE.csv", "write the table to this file", OutputFile),
+    ("--picture FILE.png", "draw maps of the expected width over slip and load", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -124,8 +95,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import working
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.experiment_design import advise, candidate_grid
-    from soilml.experiment_design.advice_after_results import mean_covariates
-    from soilml.experiment_design.next_rows import COUNT, known_soil
+    from soilml.experiment_design.next_rows import COUNT, known_soil, mean_covariates
     from soilml.experiment_design.presentation import (
         advice_columns,
         best_rows,
@@ -146,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
     table = None if args.runs is None else read_rows(args, RUNS)
     slips, loads = (
         None if text is None else parse_numbers(option, text).tolist()
-        for option, text in (("--slip", args.slips), ("--load", args.loads))
+        for option, text in (("--slip", args.slip), ("--load", args.load))
     )
     case = read_case_of_rows(args, args.model, table, available_effects(args), with_bias=False)
     change = gravity_change(args, case)

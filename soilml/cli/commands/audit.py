@@ -4,13 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.options import (
-    InputFile,
-    add_cost_option,
-    add_effects_option,
-    add_ignore_extra_option,
-    add_output,
-)
+from soilml.cli.options import InputFile, OutputFile
 from soilml.io.atomic_files import save_text
 
 FORMATS = ("table", "json")
@@ -35,19 +29,15 @@ add are ranked by the effects that they gain per cost.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("model", type=InputFile, metavar="MODEL.toml", help="gear, soil and noise")
-    parser.add_argument(
-        "design", type=InputFile, metavar="DESIGN.csv", help="planned rows: CSV, Parquet or .xlsx"
-    )
-    parser.add_argument(
-        "--free", metavar="A,B,...", help="soil parameters to fit (default: those with a prior)"
-    )
-    add_output(parser, "--out", "FILE.json", "write the audit to this file")
-    add_cost_option(parser)
-    add_ignore_extra_option(parser)
-    add_effects_option(parser)
+ARGUMENTS = (
+    ("model MODEL.toml", "gear, soil and noise", InputFile),
+    ("design DESIGN.csv", "planned rows: CSV, Parquet or .xlsx", InputFile),
+    "free",
+    ("--out FILE.json", "write the audit to this file", OutputFile),
+    "cost",
+    "ignore-extra",
+    "effects",
+)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import InputFile, add_effects_option, add_ignore_extra_option, add_output
+from soilml.cli.options import SEVERAL, InputFile, OutputFile
 from soilml.errors import InputError, MissingLibraryError, SoilmlError, TableError
 from soilml.io.atomic_files import save_text
 
@@ -57,31 +57,14 @@ LIMITS = {
 }
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "tables",
-        type=InputFile,
-        nargs="+",
-        metavar="TABLE.csv",
-        help="plate tests, shear tests, or both; CSV or Parquet",
-    )
-    parser.add_argument(
-        "--model",
-        type=InputFile,
-        metavar="MODEL.toml",
-        help="whose gear, noise and other soil values to take",
-    )
-    add_output(
-        parser,
-        "--out",
-        "SOIL.toml",
-        "write a model file with this soil, or FILE.json with estimates and remarks",
-        ".json",
-    )
-    add_output(parser, "--picture", "FILE.png", "draw the tests and the fitted laws")
-    add_ignore_extra_option(parser)
-    add_effects_option(parser)
+ARGUMENTS = (
+    ("tables TABLE.csv", "plate tests, shear tests, or both; CSV or Parquet", InputFile, SEVERAL),
+    ("--model MODEL.toml", "whose gear, noise and other soil values to take", InputFile),
+    ("--out SOIL.toml|.json", "write the soil as a model file, or estimates as JSON", OutputFile),
+    ("--picture FILE.png", "draw the tests and the fitted laws", OutputFile),
+    "ignore-extra",
+    "effects",
+)
 
 
 def run(args: argparse.Namespace) -> int:

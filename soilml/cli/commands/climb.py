@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.option_values import slip_limit
-from soilml.cli.options import InputFile, add_ignore_extra_option, add_seed_option, folder_outputs
+from soilml.cli.options import REQUIRED, InputFile, folder_outputs
 from soilml.io.atomic_files import write_files
 
 #: Files of the folder of --out.
@@ -23,9 +22,9 @@ be climbed.
 
 ROVER.toml describes a rover with four wheels:
 
-  [rover]       mass (kg), radius and width of a wheel (m); optionally
-                front_share, the share of the weight on the front wheels, and
-                height_ratio, height of the centre of mass over wheelbase
+  [rover]       mass (kg), radius and width of a wheel (m), front_share, the
+                share of the weight on the front wheels, and height_ratio,
+                height of the centre of mass over wheelbase
   [soil]        known parameters, such as cohesion = 0.0 (Pa)
   [soil.prior]  ranges of the others, such as shear_modulus = [0.001, 0.05] (m)
   [noise]       such as speed_m_s = "0.9 %", slope_rad = 0.005,
@@ -43,26 +42,14 @@ curve.csv and climbs.csv.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("rover", type=InputFile, metavar="ROVER.toml", help="rover, soil and noise")
-    parser.add_argument("runs", type=InputFile, metavar="RUNS.csv", help="climbs, CSV or Parquet")
-    parser.add_argument(
-        "--stress",
-        type=InputFile,
-        metavar="STRESS.csv",
-        required=True,
-        help="stress on the rims, CSV or Parquet",
-    )
-    parser.add_argument(
-        "--slip-limit",
-        type=slip_limit,
-        metavar="S",
-        help="give the steepest slope at slips up to S as well",
-    )
-    add_seed_option(parser)
-    add_ignore_extra_option(parser)
-    parser.add_argument("-o", "--out", metavar="FOLDER", help="folder for the four files")
+ARGUMENTS = (
+    ("rover ROVER.toml", "rover, soil and noise", InputFile),
+    ("runs RUNS.csv", "climbs, CSV or Parquet", InputFile),
+    ("--stress STRESS.csv", "stress on the rims, CSV or Parquet", InputFile, REQUIRED),
+    "seed",
+    "ignore-extra",
+    ("--out FOLDER", "folder for the four files"),
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -77,17 +64,19 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.text_tables import csv_text
     from soilml.optional_imports import need
     from soilml.report.page import report_texts
+    from soilml.systems.rim_stress.climbs import read_rover
     from soilml.systems.rim_stress.report import climbing_report
-    from soilml.systems.rim_stress.rover_file import read_rover
     from soilml.systems.rim_stress.tables import read_climb_data
 
     if args.out is not None:
         for library in ("jinja2", "matplotlib"):
             need(library, "paper climb")
     file = read_rover(args.rover)
-    data = read_climb_data(args.runs, args.stress, file.stress, ignore_extra=args.ignore_extra)
+    data = read_climb_data(
+        args.runs, args.stress, file.noise.normal_Pa, ignore_extra=args.ignore_extra
+    )
     with working(f"identifying from {len(data.climbs)} climbs"):
-        found = climbing_report(file, data, slip_limit=args.slip_limit, seed=args.seed)
+        found = climbing_report(file, data, seed=args.seed)
     content = found.as_json()
     page = found.report(f"Slopes that {Path(args.rover).name} climbs, from {Path(args.runs).name}")
     if args.out is not None:

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from soilml.cli.option_values import NumberFrom, parse_names, whole_number_from
-from soilml.cli.options import InputFile, add_output, add_report_option
+from soilml.cli.options import InputFile, OutputFile
 
 if TYPE_CHECKING:
     from soilml.report.page import Content
-    from soilml.rover_design.report import DesignReport
     from soilml.rover_design.study import DesignStudy
 
 FORMATS = ("table", "json")
@@ -60,39 +59,19 @@ shows tables. --report writes a page to read and print.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "study", type=InputFile, metavar="ROVER.toml", help="rover, wheel, soil and goal"
-    )
-    parser.add_argument(
-        "--slope", type=NumberFrom(0.0, 60.0, "degrees"), metavar="DEG", help="slope in degrees"
-    )
-    parser.add_argument("--gravity", metavar="G", help="gravity: earth, moon, mars, or in m/s^2")
-    parser.add_argument("--soil", metavar="PAPER/SOIL,...", help="published soils, each as likely")
-    parser.add_argument(
-        "--risk", type=NumberFrom(0.001, 0.5), help="probability of failing that is accepted"
-    )
-    parser.add_argument(
-        "--designs",
-        type=whole_number_from(1, 100_000),
-        default=250,
-        metavar="N",
-        help="designs of the sweep (default: 250)",
-    )
-    parser.add_argument(
-        "--draws",
-        type=whole_number_from(50, 20_000),
-        default=1000,
-        metavar="N",
-        help="draws of soil and model error (default: 1000)",
-    )
-    parser.add_argument(
-        "--sweep-only", action="store_true", help="do not search between the designs of the sweep"
-    )
-    add_output(parser, "--out", "FILE.json", "write the result to this file")
-    add_output(parser, "--picture", "FILE.png", "draw contours, front and shares")
-    add_report_option(parser)
+ARGUMENTS = (
+    ("study ROVER.toml", "rover, wheel, soil and goal", InputFile),
+    ("--slope DEG", "slope in degrees", NumberFrom(0.0, 60.0, "degrees")),
+    ("--gravity G", "gravity: earth, moon, mars, or in m/s^2"),
+    ("--soil PAPER/SOIL,...", "published soils, each as likely"),
+    ("--risk P", "probability of failing that is accepted", NumberFrom(0.001, 0.5)),
+    ("--designs N (250)", "designs of the sweep", whole_number_from(1, 100_000)),
+    ("--draws N (1000)", "draws of soil and model error", whole_number_from(50, 20_000)),
+    ("--sweep-only", "do not search between the designs of the sweep"),
+    ("--out FILE.json", "write the result to this file", OutputFile),
+    ("--picture FILE.png", "draw contours, front and shares", OutputFile),
+    "report",
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -103,12 +82,11 @@ def run(args: argparse.Namespace) -> int:
 
     need("scipy", "plan wheels")
     from soilml.report.page import json_text
-    from soilml.rover_design.presentation import report_of_design
-    from soilml.rover_design.report import design_report
+    from soilml.rover_design import design
 
     study = _study(args)
     with stage_progress() as progress:
-        found: DesignReport = design_report(
+        found = design(
             study,
             designs=args.designs,
             draws=args.draws,
@@ -116,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
             progress=progress,
         )
     content = found.as_json()
-    report = report_of_design(found, f"Wheels for {Path(args.study).name}")
+    report = found.report(f"Wheels for {Path(args.study).name}")
     files: dict[str | None, Content] = {
         args.out: json_text(content),
         args.picture: report.pictures[0].save,

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from soilml.cli.option_values import whole_number_from
-from soilml.cli.options import InputFile, add_output, add_seed_option
+from soilml.cli.options import InputFile, OutputFile
 
 DESCRIPTION = """\
 Propose the runs of [simulator] in MODEL.toml: slip, load and the soil in the
@@ -27,22 +27,13 @@ and store it as the table of [simulator].
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "model", type=InputFile, metavar="MODEL.toml", help="gear, soil, priors and [simulator]"
-    )
-    parser.add_argument(
-        "--count",
-        type=whole_number_from(1, 100_000),
-        metavar="N",
-        help="number of runs (default: 20 for each input, 5 where there are runs)",
-    )
-    parser.add_argument(
-        "--trust", action="store_true", help="run the python or command of [simulator]"
-    )
-    add_seed_option(parser)
-    add_output(parser, "--out", "DESIGN.csv", "write the design without making the runs")
+ARGUMENTS = (
+    ("model MODEL.toml", "gear, soil, priors and [simulator]", InputFile),
+    ("--count N", "number (default: 20 for each input, then 5)", whole_number_from(1, 100_000)),
+    ("--trust", "run the python or command of [simulator]"),
+    "seed",
+    ("--out DESIGN.csv", "write the design without making the runs", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -43,8 +43,7 @@ USES = {
 NEEDED = ("numpy", "onnxruntime")  # The libraries without which nothing works
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
+ARGUMENTS = ()
 
 
 def run(args: argparse.Namespace) -> int:

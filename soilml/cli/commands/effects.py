@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.options import add_effects_option
+from soilml.cli.options import OPTIONAL
 from soilml.errors import InputError, did_you_mean
 
 DESCRIPTION = """\
@@ -16,10 +16,10 @@ List the effects that [[effect]] in a model file may name.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("name", nargs="?", help="name of the effect to show")
-    add_effects_option(parser)
+ARGUMENTS = (
+    ("name", "name of the effect to show", OPTIONAL),
+    "effects",
+)
 
 
 def run(args: argparse.Namespace) -> int:

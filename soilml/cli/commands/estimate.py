@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import InputFile, add_output, add_report_option, add_row_options
+from soilml.cli.options import OPTIONAL, REPEATED, InputFile, OutputFile
 from soilml.errors import InputError, TableError
 
 if TYPE_CHECKING:
@@ -64,46 +64,17 @@ print. CSV files are in SI units; a terminal shows kPa, degrees and mm.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("trained", type=InputFile, metavar="MODEL.onnx", help="trained model file")
-    parser.add_argument(
-        "runs",
-        nargs="?",
-        type=InputFile,
-        metavar="RUNS.csv",
-        help="measured rows: CSV, Parquet or .xlsx; without it, print what the file is for",
-    )
-    parser.add_argument(
-        "--by",
-        metavar="COLUMN",
-        help="one estimate for each value of this column, such as run; all: one of all rows",
-    )
-    parser.add_argument(
-        "--with",
-        dest="others",
-        type=InputFile,
-        metavar="OTHER.onnx",
-        action="append",
-        default=[],
-        help="another model file to fuse with; can be repeated",
-    )
-    parser.add_argument(
-        "--model",
-        dest="case",
-        type=InputFile,
-        metavar="MODEL.toml",
-        help="your wheel and effects, which are compared with those of the model file; for a file "
-        "for wheels of any size, also your soil, priors and noise",
-    )
-    parser.add_argument(
-        "--exact-model",
-        action="store_true",
-        help="assume a perfect model of wheel and soil, as for one checked on a known soil",
-    )
-    add_row_options(parser)
-    add_output(parser, "--out", "FILE.csv", "write the estimates to this file")
-    add_report_option(parser)
+ARGUMENTS = (
+    ("trained MODEL.onnx", "trained model file", InputFile),
+    ("runs RUNS.csv", "measured rows; without them, what the file is for", InputFile, OPTIONAL),
+    ("--by COLUMN", "one estimate for each value of this column, such as run, or all"),
+    ("--with OTHER.onnx", "a file to fuse with; can be repeated", InputFile, REPEATED),
+    ("--model MODEL.toml", "your wheel, effects, soil, priors and noise", InputFile),
+    "exact-model",
+    "rows",
+    ("--out FILE.csv", "write the estimates to this file", OutputFile),
+    "report",
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -121,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     )
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.config.remainder import SAME_ROWS
-    from soilml.experiment_design.advice_after_results import trained_case
+    from soilml.experiment_design.expected_answers import trained_case
     from soilml.identification.model_error_inputs import trained_remainder, with_exact_model
     from soilml.identification.trained_estimator import check_table_wheel, estimators_for_case
     from soilml.io.bounds import ESTIMATES
@@ -131,9 +102,9 @@ def run(args: argparse.Namespace) -> int:
     from soilml.quantities import column
     from soilml.remarks import texts
 
-    estimators = [Estimator.load(file) for file in (args.trained, *args.others)]
+    estimators = [Estimator.load(file) for file in (args.trained, *args.with_)]
     _check_options(args, estimators)
-    if args.runs is None and args.case is None:
+    if args.runs is None and args.model is None:
         show("\n".join(presentation.description(estimator).text for estimator in estimators))
         return 0
     read = {name: column(name) for estimator in estimators for name in estimator.inputs}
@@ -143,15 +114,15 @@ def run(args: argparse.Namespace) -> int:
     if args.runs is not None:
         table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
         ESTIMATES.check(table.source, len(table))
-    if args.case is not None:
-        case = read_case_of_rows(args, args.case, table)
+    if args.model is not None:
+        case = read_case_of_rows(args, args.model, table)
         if table is not None and not any(map(trained_remainder, estimators)):
             learned, case = case.remainder, case.without_remainder_of(table)
             own = [SAME_ROWS] if case.remainder is not learned else []
     if args.exact_model:
         estimators = [with_exact_model(estimator) for estimator in estimators]
     estimators, remarks = estimators_for_case(
-        estimators, case, args.case, pooled=args.by is not None
+        estimators, case, args.model, pooled=args.by is not None
     )
     remarks = [*map(presentation.description, estimators), *remarks, *own]
     if table is None:
@@ -204,7 +175,7 @@ def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> Non
 
     if args.runs is None and any((args.by, args.where, args.out, args.report)):
         raise InputError("RUNS.csv is missing: --by, --where, --out and --report are for its rows")
-    if args.by is not None and args.others:
+    if args.by is not None and args.with_:
         raise InputError("--with fuses single rows; omit --by")
     if not are_comparable([e.errors for e in estimators]):
         table_estimates.check_independent(estimators)
@@ -224,7 +195,7 @@ def _row_estimates(
     """Columns with a line for every row, blank where no model has all its readings, and remarks."""
     import numpy as np
 
-    from soilml.experiment_design.advice_after_results import advice_after_estimate
+    from soilml.experiment_design.next_rows import advice_after_estimate
     from soilml.onboard import presentation, table_estimates
     from soilml.onboard.multi_sensor import fuse_estimates
     from soilml.quantities import column
@@ -290,7 +261,7 @@ def _group_estimates(
     import numpy as np
 
     from soilml.cli.progress import row_progress
-    from soilml.experiment_design.advice_after_results import advice_after_estimate
+    from soilml.experiment_design.next_rows import advice_after_estimate
     from soilml.identification.model_error_inputs import readings_with_model_error
     from soilml.identification.trained_estimator import narrower_priors
     from soilml.io.table import ALL

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from soilml.cli.options import SEVERAL
 from soilml.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
@@ -139,14 +140,13 @@ MEASURED = ("run", "slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m")
 RATE, STAGE, RADIUS = 50.0, 6.0, 0.15  # Rows a second, seconds at each slip, m
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "words",
-        nargs="+",
-        metavar="[NAME] FOLDER",
-        help=f"{', '.join(EXAMPLES)} (default: campaign), and the folder for its files",
-    )
+ARGUMENTS = (
+    (
+        "words [NAME] FOLDER",
+        f"{', '.join(EXAMPLES)} (default: campaign), and the folder for its files",
+        SEVERAL,
+    ),
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -297,9 +297,7 @@ def _climb() -> tuple[str, str, str]:
     import numpy as np
 
     from soilml.io.text_tables import csv_text
-    from soilml.systems.rim_stress import SimulatedRover
-    from soilml.systems.rim_stress.simulated_rover import SLOPES
-    from soilml.systems.rim_stress.tables import climb_tables
+    from soilml.systems.rim_stress.simulation import SLOPES, SimulatedRover, climb_tables
 
     true, rng = SimulatedRover(), np.random.default_rng(4)
     climbs = true.simulate_climbs(rng, SLOPES[:2])
@@ -312,8 +310,15 @@ def _wheel_leg() -> tuple[str]:
     import numpy as np
 
     from soilml.io.text_tables import csv_text
-    from soilml.systems.wheel_legs import TORQUE_SLIP, VIBRATION_SLIP
-    from soilml.systems.wheel_legs.stride_relations import LINEAR, S_I, S_Z, SIMPLIFIED, SINKAGE
+    from soilml.systems.wheel_legs.stride_relations import (
+        LINEAR,
+        S_I,
+        S_Z,
+        SIMPLIFIED,
+        SINKAGE,
+        TORQUE_SLIP,
+        VIBRATION_SLIP,
+    )
 
     rng, columns = np.random.default_rng(4), dict[str, list[Any]]()
     relations = (TORQUE_SLIP["simplified"], VIBRATION_SLIP["linear"])

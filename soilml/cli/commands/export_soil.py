@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from soilml.cli.option_values import named_numbers, whole_number_from
-from soilml.cli.options import InputFile, add_seed_option, folder_outputs
+from soilml.cli.options import REPEATED, REQUIRED, InputFile, folder_outputs
 from soilml.errors import InputError
 
 DESCRIPTION = """\
@@ -35,34 +35,15 @@ says where one file hides that a parameter is not determined.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "fit", type=InputFile, metavar="FIT.json", help="result of identify, or MODEL.toml"
-    )
-    parser.add_argument(
-        "--to", required=True, help="chrono, chrono-crm, gazebo, isaac or csv", metavar="TARGET"
-    )
-    parser.add_argument("-o", "--out", required=True, metavar="FOLDER", help="folder for the files")
-    parser.add_argument(
-        "--draws",
-        type=whole_number_from(0),
-        default=0,
-        metavar="N",
-        help="number of soils drawn from the posterior (default: 0)",
-    )
-    parser.add_argument(
-        "--set",
-        dest="given",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="value of a parameter of the target that rows cannot reveal; can be repeated",
-    )
-    parser.add_argument(
-        "--group", dest="run_name", metavar="NAME", help="which result of `identify --by`"
-    )
-    add_seed_option(parser)
+ARGUMENTS = (
+    ("fit FIT.json", "result of identify, or MODEL.toml", InputFile),
+    ("--to TARGET", "chrono, chrono-crm, gazebo, isaac or csv", REQUIRED),
+    ("--out FOLDER", "folder for the files", REQUIRED),
+    ("--draws N (0)", "number of soils drawn from the posterior", whole_number_from(0)),
+    ("--set NAME=VALUE", "value that rows cannot reveal; can be repeated", REPEATED),
+    ("--group NAME", "which result of `identify --by`"),
+    "seed",
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -77,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.report.numbers import significant
     from soilml.soil_export import export_soil
 
-    given = named_numbers(args.given, "--set", "NAME=NUMBER, such as elastic_K=1e8")
+    given = named_numbers(args.set, "--set", "NAME=NUMBER, such as elastic_K=1e8")
     if not args.out:
         raise InputError("--out is empty; needed is a folder")
     words = getattr(args, "command_line", [])
@@ -87,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
         args.out,
         draws=args.draws,
         given=given,
-        run=args.run_name,
+        run=args.group,
         seed=args.seed,
         words=words,
     )

@@ -6,14 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import (
-    add_cost_option,
-    add_effects_option,
-    add_model_and_runs,
-    add_row_options,
-    add_seed_option,
-    folder_outputs,
-)
+from soilml.cli.options import REPEATED, REQUIRED, folder_outputs
 from soilml.errors import InputError
 from soilml.io.atomic_files import write_files
 from soilml.io.cell_text import read_number
@@ -59,31 +52,17 @@ ranked by what they discriminate per cost.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add_model_and_runs(parser)
-    parser.add_argument(
-        "-o", "--out", metavar="FOLDER", required=True, help="folder for the four files"
-    )
-    parser.add_argument(
-        "--holdout",
-        metavar="COLUMN=VALUE",
-        help="rows held out for validation, or `run` for a quarter of the runs",
-    )
-    parser.add_argument(
-        "--free", metavar="A,B,...", help="soil parameters to fit (default: those with a prior)"
-    )
-    add_seed_option(parser)
-    parser.add_argument(
-        "--checked",
-        metavar="EFFECT=STD",
-        action="append",
-        default=[],
-        help="standard deviation of a sensor's fault after calibration; can be repeated",
-    )
-    add_cost_option(parser)
-    add_row_options(parser)
-    add_effects_option(parser)
+ARGUMENTS = (
+    "model-and-runs",
+    ("--out FOLDER", "folder for the four files", REQUIRED),
+    ("--holdout COLUMN=VALUE", "rows held out for validation, or `run` for a quarter of the runs"),
+    "free",
+    "seed",
+    ("--checked EFFECT=STD", "std of a sensor's fault after calibration; can repeat", REPEATED),
+    "cost",
+    "rows",
+    "effects",
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -105,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     for library in ("scipy", "jinja2", "matplotlib"):
         need(library, "gap")
     from soilml.gap import gap
-    from soilml.gap.report.report import gap_files
+    from soilml.gap.report import gap_files
 
     table, costs = read_rows(args, RUNS), parse_costs(args)
     effects = available_effects(args)

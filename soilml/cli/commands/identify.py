@@ -6,15 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import (
-    InputFile,
-    add_by_option,
-    add_effects_option,
-    add_model_and_runs,
-    add_output,
-    add_report_option,
-    add_row_options,
-)
+from soilml.cli.options import OutputFile
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -54,11 +46,9 @@ Use `posterior` only where model and sensors were verified on a known soil. It
 and `averaged` report which parameters the rows do not determine, and the next
 measurement that would help most.
 
---mean averages the groups of --by, with the errors that they share. --fresh
-predicts other rows by the mean, and gives the regression of measured on
-predicted values:
+--mean averages the groups of --by, with the errors that they share:
 
-  soilml identify MODEL.toml RUNS.csv --by run --mean --fresh MORE.csv
+  soilml identify MODEL.toml RUNS.csv --by run --mean
 
 The verdict comes first; -v shows all of it, and --out FILE.json has the result
 in SI units. --report writes a page to read and print. `left of prior`
@@ -67,34 +57,22 @@ the prior; +- is the expected error. Read the warnings.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add_model_and_runs(parser)
-    parser.add_argument(
-        "--method",
-        default="averaged",
-        help="averaged (default), posterior, nonlinear, linear or newton",
-    )
-    parser.add_argument(
-        "--free", metavar="A,B,...", help="parameters to identify (default: those with a prior)"
-    )
-    add_effects_option(parser)
-    add_by_option(parser)
-    parser.add_argument("--mean", action="store_true", help="with --by: the mean of the groups too")
-    parser.add_argument(
-        "--fresh",
-        type=InputFile,
-        metavar="MORE.csv",
-        help="with --mean: other rows, measured against what the mean predicts",
-    )
-    add_row_options(parser)
-    add_output(parser, "--out", "FILE.json", "write the result to this file")
-    add_report_option(parser)
+ARGUMENTS = (
+    "model-and-runs",
+    ("--method NAME (averaged)", "averaged, posterior, nonlinear, linear or newton"),
+    "free",
+    "effects",
+    "by",
+    ("--mean", "with --by: the mean of the groups too"),
+    "rows",
+    ("--out FILE.json", "write the result to this file", OutputFile),
+    "report",
+)
 
 
 def run(args: argparse.Namespace) -> int:
     """Identify and write the result."""
-    from dataclasses import asdict, replace
+    from dataclasses import replace
 
     from soilml.cli.option_values import parse_names
     from soilml.cli.options import available_effects
@@ -107,26 +85,19 @@ def run(args: argparse.Namespace) -> int:
         tell_failures,
     )
     from soilml.config.case import read_case
-    from soilml.io.read_table import RUNS, read_table
+    from soilml.io.read_table import RUNS
     from soilml.optional_imports import need
     from soilml.remarks import texts
     from soilml.report.page import json_text
 
     if args.mean and args.by is None:
         raise InputError("--mean averages groups: name their column, such as --by run")
-    if args.fresh is not None and not args.mean:
-        raise InputError("--fresh predicts rows by the mean of groups: add --mean")
     need("scipy", "identify")
-    from soilml.experiment_design.advice_after_results import advice_after_fit
+    from soilml.experiment_design.next_rows import advice_after_fit
     from soilml.experiment_design.presentation import advice_as_json, next_row_remarks
     from soilml.identification import identify
     from soilml.identification.report import fit_report, group_report, soil_entries
-    from soilml.systems.tracked_robot.group_identification import GroupFits, regressions
-    from soilml.systems.tracked_robot.regression_presentation import (
-        regression_lines,
-        regression_picture,
-        regression_table,
-    )
+    from soilml.systems.tracked_robot.group_identification import GroupFits
 
     table = read_rows(args, RUNS)
     effects = available_effects(args)
@@ -160,18 +131,6 @@ def run(args: argparse.Namespace) -> int:
             mean = GroupFits(tuple(fits.values())).average
             content["mean"] = mean.as_json() | soil_entries(case, mean, with_draws=False)
         report = group_report(fits, failed, args.by, title, mean)
-    if args.fresh is not None and mean is not None:
-        if case.gears:
-            raise InputError("--fresh predicts rows of one gear: name it by --gear")
-        fresh = read_table(args.fresh, ("slip", "load_N"), ignore_extra=args.ignore_extra)
-        lines, name = regressions(case, mean, fresh.rows(fresh.answered)), Path(args.fresh).name
-        content["mean"]["regression"] = {key: asdict(one.line) for key, one in lines.items()}
-        report = replace(
-            report,
-            lines=[*regression_lines(lines, name), *report.lines],
-            tables=[*report.tables, regression_table(lines, name)],
-            pictures=[*report.pictures, regression_picture(lines, name)],
-        )
     write_with_report(args, {args.out: json_text(content)}, lambda: (report, content))
     show_result(report, {k: content[k] for k in content if k != "draws"})
     tell_failures(args.by, failed)

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import InputFile
+from soilml.cli.options import SEVERAL, InputFile
 from soilml.errors import InputError
 from soilml.io.atomic_files import output_files, save_text, write_files
 
@@ -45,23 +45,14 @@ _MOST_SHOWN = 40
 _MOST_NAMED = 4  # Most logs that the next command names
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("files", type=InputFile, metavar="LOG", nargs="+", help="logs, of any kind")
-    parser.add_argument(
-        "--init", action="store_true", help="write a commented map with guesses, and no table"
-    )
-    parser.add_argument(
-        "--explain", action="store_true", help="with --init: print what speaks for each guess"
-    )
-    parser.add_argument("--map", type=InputFile, metavar="MAP.toml", help="how the logs are read")
-    parser.add_argument(
-        "-o",
-        "--out",
-        metavar="RUNS.csv",
-        help="write table and report; with --init, the map",
-    )
-    parser.add_argument("--accept", action="store_true", help="import although the map looks wrong")
+ARGUMENTS = (
+    ("files LOG", "logs, of any kind", InputFile, SEVERAL),
+    ("--init", "write a commented map with guesses, and no table"),
+    ("--explain", "with --init: print what speaks for each guess"),
+    ("--map MAP.toml", "how the logs are read", InputFile),
+    ("--out RUNS.csv", "write table and report; with --init, the map"),
+    ("--accept", "import although the map looks wrong"),
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

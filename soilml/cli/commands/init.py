@@ -40,30 +40,16 @@ LENGTHS = {
 }
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("out", metavar="MODEL.toml", help="the file to write")
-    parser.add_argument("--radius", metavar="M", help="wheel radius in m, or such as '15 cm'")
-    parser.add_argument("--width", metavar="M", help="wheel width in m, or such as '120 mm'")
-    parser.add_argument(
-        "--soil",
-        metavar="PAPER/SOIL",
-        help="soil whose bearing is known; `soilml show soils` lists them",
-    )
-    parser.add_argument(
-        "--torque-noise",
-        metavar="NOISE",
-        help="standard deviation of torque: '2 %%', 0.05 (N m) or '2 %% + 0.05' (default: 2 %%)",
-    )
-    parser.add_argument("--mass", metavar="KG", help="mass of a rover in kg")
-    parser.add_argument(
-        "--wheels",
-        type=whole_number_from(2, 100),
-        metavar="N",
-        help="its number of wheels (default: 4)",
-    )
-    for name, text in LENGTHS.items():
-        parser.add_argument(f"--{name}", metavar="M", help=f"its {text}, in m or such as '40 cm'")
+ARGUMENTS = (
+    ("out MODEL.toml", "the file to write"),
+    ("--radius M", "wheel radius in m, or such as '15 cm'"),
+    ("--width M", "wheel width in m, or such as '120 mm'"),
+    ("--soil PAPER/SOIL", "soil whose bearing is known; `soilml show soils` lists them"),
+    ("--torque-noise NOISE", "std of torque, such as 0.05 (N m) or '2 %% + 0.05' (default: 2 %%)"),
+    ("--mass KG", "mass of a rover in kg"),
+    ("--wheels N", "its number of wheels (default: 4)", whole_number_from(2, 100)),
+    *((f"--{name} M", f"its {text}, in m or such as '40 cm'") for name, text in LENGTHS.items()),
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from soilml.cli.option_values import NumberFrom, whole_number_from
-from soilml.cli.options import InputFile, add_effects_option, add_row_options, folder_outputs
+from soilml.cli.options import InputFile, folder_outputs
 
 SIZE = NumberFrom(0.01, 1000.0, "m")  # Of a cell, and how far a reading reaches
 DESCRIPTION = """\
@@ -35,30 +35,19 @@ headings, and the occupancy is that of the worst of them.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("rover", type=InputFile, metavar="ROVER.toml", help="wheel, soil, rover")
-    parser.add_argument("runs", type=InputFile, metavar="DRIVE.csv", help="rows with positions")
-    parser.add_argument(
-        "--from", dest="trained", type=InputFile, metavar="MODEL.onnx",
-        help="trained file for this wheel (default: any_wheel)",
-    )  # fmt: skip
-    parser.add_argument("--slope", metavar="DEG,...", help="slopes in degrees (default: 0,5,10,15)")
-    parser.add_argument("--cell", type=SIZE, metavar="M", help="side of a cell (default: 0.5)")
-    parser.add_argument(
-        "--reach", type=SIZE, metavar="M",
-        help="distance from a reading up to which the soil is known (default: 2)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--elevation", type=InputFile, metavar="DEM.tif", help="heights of the terrain, m"
-    )
-    parser.add_argument(
-        "--epsg", type=whole_number_from(1024, 32766), metavar="CODE",
-        help="projected coordinate system of x and y, for the GeoTIFF",
-    )  # fmt: skip
-    add_effects_option(parser)
-    add_row_options(parser)
-    parser.add_argument("-o", "--out", metavar="FOLDER", help="folder for the files")
+ARGUMENTS = (
+    ("rover ROVER.toml", "wheel, soil, rover", InputFile),
+    ("runs DRIVE.csv", "rows with positions", InputFile),
+    ("--from MODEL.onnx", "trained file for this wheel (default: any_wheel)", InputFile),
+    ("--slope DEG,...", "slopes in degrees (default: 0,5,10,15)"),
+    ("--cell M", "side of a cell (default: 0.5)", SIZE),
+    ("--reach M", "distance from a reading up to which the soil is known (default: 2)", SIZE),
+    ("--elevation DEM.tif", "heights of the terrain, m", InputFile),
+    ("--epsg CODE", "projected system of x and y, for map.tif", whole_number_from(1024, 32766)),
+    "effects",
+    "rows",
+    ("--out FOLDER", "folder for the files"),
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -94,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
         found = soil_map(
             case,
             table,
-            None if args.trained is None else Estimator.load(args.trained),
+            None if args.from_ is None else Estimator.load(args.from_),
             cell=CELL if args.cell is None else args.cell,
             reach=REACH if args.reach is None else args.reach,
             slopes=SLOPES if args.slope is None

@@ -17,8 +17,7 @@ file wherever a command reads a model file:
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
+ARGUMENTS = ()
 
 
 def run(args: argparse.Namespace) -> int:

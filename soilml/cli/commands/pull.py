@@ -7,19 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.option_values import slip_limit
-from soilml.cli.options import (
-    InputFile,
-    add_by_option,
-    add_effects_option,
-    add_exact_model_option,
-    add_gravity_options,
-    add_model_and_runs,
-    add_output,
-    add_report_option,
-    add_row_options,
-    gravity_change,
-)
+from soilml.cli.option_values import SLIP
+from soilml.cli.options import InputFile, OutputFile, gravity_change
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -75,34 +64,22 @@ than the prior. The CSV file has a row for each load and slip, in SI units.
 MAX_LOADS = 8  # Largest number of loads
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add_model_and_runs(parser)
-    parser.add_argument(
-        "--load", metavar="N,...", help="vertical loads in N: A,B,... or start:stop:count"
-    )
-    parser.add_argument("--slope", metavar="DEG,...", help="slopes of a rover in degrees")
-    add_gravity_options(parser)
-    parser.add_argument(
-        "--slip-limit", type=slip_limit, metavar="S", help="largest slip considered"
-    )
-    parser.add_argument(
-        "--free", metavar="A,B,...", help="unknown parameters (default: those with a prior)"
-    )
-    parser.add_argument(
-        "--from",
-        dest="trained",
-        type=InputFile,
-        metavar="MODEL.onnx",
-        help="use the soil that this trained file estimates",
-    )
-    add_effects_option(parser)
-    add_by_option(parser)
-    add_row_options(parser)
-    add_exact_model_option(parser)
-    add_output(parser, "--out", "FILE.csv", "write the curves to this file")
-    add_output(parser, "--picture", "FILE.png", "draw the curves and bands")
-    add_report_option(parser)
+ARGUMENTS = (
+    "model-and-runs",
+    ("--load N,...", "vertical loads in N: A,B,... or start:stop:count"),
+    ("--slope DEG,...", "slopes of a rover in degrees"),
+    "gravity",
+    ("--slip-limit S", "largest slip considered", SLIP),
+    "free",
+    ("--from MODEL.onnx", "use the soil that this trained file estimates", InputFile),
+    "effects",
+    "by",
+    "rows",
+    "exact-model",
+    ("--out FILE.csv", "write the curves to this file", OutputFile),
+    ("--picture FILE.png", "draw the curves and bands", OutputFile),
+    "report",
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -176,14 +153,14 @@ def _run_rover(args: argparse.Namespace, case: Case, table: Table, options: dict
 
 def _estimator(args: argparse.Namespace) -> Estimator | None:
     """The trained file of --from."""
-    if args.trained is None:
+    if args.from_ is None:
         return None
     from soilml.optional_imports import need
 
     need("onnxruntime", "pull")
     from soilml.onboard.estimator import Estimator
 
-    return Estimator.load(args.trained)
+    return Estimator.load(args.from_)
 
 
 def _check(args: argparse.Namespace) -> None:
@@ -191,9 +168,9 @@ def _check(args: argparse.Namespace) -> None:
         raise InputError(
             "--picture draws one soil; select it with --where run=NAME instead of --by"
         )
-    if args.trained is not None and args.exact_model:
+    if args.from_ is not None and args.exact_model:
         raise InputError("--exact-model applies to the rows, not to the file of --from")
-    if args.trained is not None and args.free is not None:
+    if args.from_ is not None and args.free is not None:
         raise InputError(
             "--free applies to the posterior; the parameters of --from are those of the model file"
         )

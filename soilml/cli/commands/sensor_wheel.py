@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.option_values import NumberFrom
-from soilml.cli.options import InputFile, add_gear_option, add_output
+from soilml.cli.option_values import NumberFrom, whole_number_from
+from soilml.cli.options import InputFile, OutputFile
 from soilml.errors import InputError
 
 FORMATS = ("table", "csv", "json")
@@ -36,31 +36,18 @@ wheels: soilml paper climb.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "model", type=InputFile, metavar="MODEL.toml", help="the wheel, and the soil's strength"
-    )
-    parser.add_argument("runs", type=InputFile, metavar="RUNS.csv", help="a row for each run")
-    stress = parser.add_mutually_exclusive_group(required=True)
-    stress.add_argument(
-        "--readings", type=InputFile, metavar="READINGS.csv", help="samples of the sensors"
-    )
-    stress.add_argument("--stress", type=InputFile, metavar="STRESS.csv", help="stress on the rim")
-    parser.add_argument("--reference", metavar="RUN", help="run whose k_x predicts the pulls")
-    add_gear_option(parser)
-    parser.add_argument(
-        "--diameter",
-        type=NumberFrom(1e-4, 1.0, "m"),
-        metavar="M",
-        help="diameter of round sensors, whose averaging over the disc is removed (of readings: "
-        "0.0095 m by default)",
-    )
-    parser.add_argument(
-        "--sensors", type=NumberFrom(1, 1000), default=4.0, metavar="N", help="in the row (4)"
-    )
-    add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_output(parser, "--picture", "FILE.png", "draw k_x, pull and slope against slip")
+ARGUMENTS = (
+    ("model MODEL.toml", "the wheel, and the soil's strength", InputFile),
+    ("runs RUNS.csv", "a row for each run", InputFile),
+    ("--readings READINGS.csv", "samples of the sensors", InputFile),
+    ("--stress STRESS.csv", "stress on the rim", InputFile),
+    ("--reference RUN", "run whose k_x predicts the pulls"),
+    "gear",
+    ("--diameter M", "of round sensors, to remove their averaging", NumberFrom(1e-4, 1.0, "m")),
+    ("--sensors N (4)", "number in the row", whole_number_from(1, 1000)),
+    ("--out FILE.csv", "write the table to this file", OutputFile),
+    ("--picture FILE.png", "draw k_x, pull and slope against slip", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -76,6 +63,8 @@ def run(args: argparse.Namespace) -> int:
         read_stresses,
     )
 
+    if (args.readings is None) == (args.stress is None):
+        raise InputError("give --readings or --stress, one of them")
     case = read_case_of_one_gear(args.model, EFFECTS, args.gear)
     gear, soil = case.model.gear, case.soil
     if not isinstance(gear, Wheel):

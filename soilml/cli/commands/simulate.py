@@ -7,7 +7,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.option_values import NumberFrom
-from soilml.cli.options import InputFile, add_effects_option, add_gear_option, add_output
+from soilml.cli.options import REQUIRED, InputFile, OutputFile
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,8 +30,7 @@ The mean of a [remainder] of MODEL.toml is added; --std gives its uncertainty.
 and the share of the thrust that is left as pull (Comin and Saaj 2017, eq. 32),
 with its class: non-trafficable, unsafe from 35 %, safe from 50 %, trafficable
 from 65 %. --balance adds how a track stands: shares of the load, trim, sinkage of
-the rear wheel, tension, centre of pressure. By default its trim is that of
-MODEL.toml; with --hitch and --behind it follows from the moments of the pull.
+the rear wheel, tension, centre of pressure.
 Without --out the table is printed, aligned on a terminal and as CSV into a
 pipe.
 """
@@ -40,64 +39,22 @@ _ONCE_RADIANS = 1.6  # Largest slip angle in radians, the unit of the version be
 MOST_BALANCED = 2000  # Most rows of --balance, whose integrals take some 50 kB each
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "model", type=InputFile, metavar="MODEL.toml", help="gear, soil and effects"
-    )
-    parser.add_argument(
-        "--slip",
-        metavar="S,...",
-        required=True,
-        help="slip ratios, above 0 driving, below 0 braking",
-    )
-    parser.add_argument("--load", metavar="N,...", required=True, help="vertical loads in N")
-    parser.add_argument(
-        "--speed",
-        type=NumberFrom(-100.0, 100.0, "m/s"),
-        metavar="M_S",
-        help="speed in m/s, below 0 in reverse",
-    )
-    parser.add_argument(
-        "--pass",
-        dest="passes",
-        type=NumberFrom(1.0, 1e4),
-        help="number of the pass: 1 on undisturbed soil",
-    )
-    parser.add_argument(
-        "--slip-angle",
-        type=NumberFrom(-91.0, 91.0, "degrees"),
-        metavar="DEG",
-        help="angle between wheel plane and path, in degrees",
-    )
-    add_effects_option(parser)
-    add_gear_option(parser)
-    parser.add_argument(
-        "--run", dest="label", metavar="NAME", help="add a first column `run` with this name"
-    )
-    parser.add_argument(
-        "--std", action="store_true", help="add the std of the model's error from [remainder]"
-    )
-    parser.add_argument(
-        "--efficiency", action="store_true", help="add tractive efficiency and pull efficiency"
-    )
-    parser.add_argument(
-        "--balance", action="store_true", help="add how a track stands: shares of the load, trim"
-    )
-    parser.add_argument(
-        "--hitch",
-        type=NumberFrom(-10.0, 10.0, "m"),
-        metavar="M",
-        help="with --balance: height of the pull above the belt",
-    )
-    parser.add_argument(
-        "--behind",
-        type=NumberFrom(-10.0, 10.0, "m"),
-        metavar="M",
-        help="with --balance: centre of mass behind the middle of the track",
-    )
-    add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_output(parser, "--picture", "FILE.png", "draw the columns against slip")
+ARGUMENTS = (
+    ("model MODEL.toml", "gear, soil and effects", InputFile),
+    ("--slip S,...", "slip ratios, above 0 driving, below 0 braking", REQUIRED),
+    ("--load N,...", "vertical loads in N", REQUIRED),
+    ("--speed M_S", "speed in m/s, below 0 in reverse", NumberFrom(-100.0, 100.0, "m/s")),
+    ("--pass N", "number of the pass: 1 on undisturbed soil", NumberFrom(1.0, 1e4)),
+    ("--slip-angle DEG", "between wheel plane and path", NumberFrom(-91.0, 91.0, "degrees")),
+    "effects",
+    "gear",
+    ("--run NAME", "add a first column `run` with this name", {"dest": "label"}),
+    ("--std", "add the std of the model's error from [remainder]"),
+    ("--efficiency", "add tractive efficiency and pull efficiency"),
+    ("--balance", "add how a track stands: shares of the load, trim"),
+    ("--out FILE.csv", "write the table to this file", OutputFile),
+    ("--picture FILE.png", "draw the columns against slip", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -110,16 +67,14 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import progress_bar
     from soilml.config.case import read_case_of_one_gear
     from soilml.fitting.covariance import ignored_discrepancy
+    from soilml.fitting.global_optimum import missing_peak
     from soilml.fitting.simulation import simulate
-    from soilml.fitting.uncarried_loads import missing_peak
     from soilml.io.bounds import ROWS
     from soilml.io.table import fault_of_text
     from soilml.physics.operating_point import Operating
     from soilml.row_status import Status
-    from soilml.systems.tracked_robot.robot import UNBALANCED, balanced_rows, settled_rows
+    from soilml.systems.tracked_robot.robot import balanced_rows
 
-    if not args.balance and (args.hitch is not None or args.behind is not None):
-        raise InputError("--hitch and --behind balance the moments of a track: add --balance")
     if args.label is not None and (fault := fault_of_text(args.label)):
         raise InputError(f"--run: {fault}")
     slips, loads = parse_numbers("--slip", args.slip), parse_numbers("--load", args.load)
@@ -138,17 +93,11 @@ def run(args: argparse.Namespace) -> int:
     angle = None if args.slip_angle is None else np.deg2rad(args.slip_angle)
     if angle is not None and 0.0 < abs(args.slip_angle) <= _ONCE_RADIANS:
         tell(f"! --slip-angle is in degrees now: {args.slip_angle:g} degrees")
-    known = {"speed": args.speed, "pass_number": args.passes, "slip_angle": angle}
+    known = {"speed": args.speed, "pass_number": args.pass_, "slip_angle": angle}
     options: dict[str, Any] = {**known, "run": args.label, "with_std": args.std}
-    options["with_efficiency"], settling = args.efficiency, None
+    options["with_efficiency"] = args.efficiency
     with progress_bar(f"simulating {slip.size} rows", slip.size) as done:
-        if args.hitch is not None or args.behind is not None:
-            behind, hitch = args.behind or 0.0, args.hitch or 0.0
-            rows, settling = settled_rows(case, slip, load, behind=behind, hitch=hitch, **options)
-            if np.isnan(settling).all():
-                raise InputError(f"{UNBALANCED}; change --hitch or --behind")
-        else:
-            rows = simulate(case, slip, load, on_rows=done, **options)
+        rows = simulate(case, slip, load, on_rows=done, **options)
     failed = int(np.count_nonzero(~rows.answered))
     if failed == slip.size:
         force = case.model(case.soil, Operating(slip=slip[:1], load=load[:1], **known))
@@ -160,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
             f"no row has an equilibrium; {worst.reason}{limit}: change --load or the soil"
         )
     if args.balance:
-        rows = balanced_rows(case, rows, settling)
+        rows = balanced_rows(case, rows)
     write_columns(rows.columns, args.out, args.picture, _picture(rows, loads.size))
     for line in ignored_discrepancy(case, "simulate", "the rows have no error of the model"):
         print(line, file=sys.stderr)

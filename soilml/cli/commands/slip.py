@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.options import InputFile, add_effects_option, add_ignore_extra_option, add_output
+from soilml.cli.options import InputFile, OutputFile
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
@@ -29,16 +29,14 @@ not determined. FILE.json has the same with remarks.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("rover", type=InputFile, metavar="ROVER.toml", help="rover and prior")
-    parser.add_argument(
-        "drive", type=InputFile, metavar="DRIVE.csv", help="a row for each time and wheel"
-    )
-    add_effects_option(parser)
-    add_ignore_extra_option(parser)
-    add_output(parser, "--out", "FILE.csv", "write the table to this file, or FILE.json", ".json")
-    add_output(parser, "--picture", "FILE.png", "draw slip, speed and pitch against time")
+ARGUMENTS = (
+    ("rover ROVER.toml", "rover and prior", InputFile),
+    ("drive DRIVE.csv", "a row for each time and wheel", InputFile),
+    "effects",
+    "ignore-extra",
+    ("--out FILE.csv|.json", "write the table to this file, or FILE.json", OutputFile),
+    ("--picture FILE.png", "draw slip, speed and pitch against time", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,6 +6,7 @@ import argparse
 import json
 from typing import TYPE_CHECKING
 
+from soilml.cli.options import OPTIONAL
 from soilml.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
@@ -21,10 +22,7 @@ that is not printed in the paper and is assumed.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("name", nargs="?", help="PAPER/SOIL, the name of the soil to show")
-    parser.add_argument("--json", action="store_true", help=argparse.SUPPRESS)
+ARGUMENTS = (("name", "PAPER/SOIL, the name of the soil to show", OPTIONAL),)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -38,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
             "`soilml show soils` lists them"
         )
     chosen = catalogue if args.name is None else {args.name: catalogue[args.name]}
-    if args.json or args.format == "json":
+    if args.format == "json":
         print(json.dumps({name: _as_json(entry) for name, entry in chosen.items()}, indent=1))
     elif args.name is None:
         print(_list(list(chosen.values())))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from soilml.cli.option_values import NumberFrom
-from soilml.cli.options import InputFile, add_gear_option, add_output
+from soilml.cli.options import REQUIRED, InputFile, OutputFile
 from soilml.errors import InputError
 
 FORMATS = ("table", "csv", "json")
@@ -30,24 +30,16 @@ the friction of soil that has yielded, as an input: the paper does not print it.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "model", type=InputFile, metavar="MODEL.toml", help="track, soil and its priors"
-    )
-    parser.add_argument("runs", type=InputFile, metavar="LOG.csv", help="the log")
-    parser.add_argument(
-        "--mass", type=NumberFrom(0.01, 1e5, "kg"), required=True, metavar="KG", help="of the robot"
-    )
-    parser.add_argument(
-        "--spacing", type=NumberFrom(0.01, 100.0, "m"), metavar="M", help="between the lasers"
-    )
-    parser.add_argument(
-        "--grousers", metavar="PITCH,TIP,FG,JK", help="pitch and tip (m), f_g, and j_k (m)"
-    )
-    add_gear_option(parser)
-    add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_output(parser, "--picture", "FILE.png", "draw pull, sinkage, belt and angles")
+ARGUMENTS = (
+    ("model MODEL.toml", "track, soil and its priors", InputFile),
+    ("runs LOG.csv", "the log", InputFile),
+    ("--mass KG", "of the robot", NumberFrom(0.01, 1e5, "kg"), REQUIRED),
+    ("--spacing M", "between the lasers", NumberFrom(0.01, 100.0, "m")),
+    ("--grousers PITCH,TIP,FG,JK", "pitch and tip (m), f_g, and j_k (m)"),
+    "gear",
+    ("--out FILE.csv", "write the table to this file", OutputFile),
+    ("--picture FILE.png", "draw pull, sinkage, belt and angles", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:

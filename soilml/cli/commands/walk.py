@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from soilml.cli.option_values import NumberFrom
-from soilml.cli.options import add_output
+from soilml.cli.options import OutputFile
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -34,31 +34,19 @@ Neighbouring legs do not act on each other, and the body is a plate below the hu
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("--foot", default="LTF", metavar="A,B,...", help="feet (default: LTF)")
-    parser.add_argument("--legs", default="5", help="numbers of legs, 1 to 6 (default: 5)")
-    parser.add_argument("--ground", metavar="A,B,...", help="soils of table I (default: all four)")
-    parser.add_argument("--stiffness", help="stiffnesses in N/m^3, in place of --ground")
-    parser.add_argument(
-        "--slip", metavar="S,...", help="commanded slips; without it the wheel rolls freely"
-    )
-    parser.add_argument("--offset", action="store_true", help="with the stress at the surface")
-    parser.add_argument(
-        "--mass", type=NumberFrom(0.01, 1e5, "kg"), metavar="KG", help="carried (default: 3.75 kg)"
-    )
-    spin = NumberFrom(1e-3, 100.0, "rad/s")
-    parser.add_argument(
-        "--angular-speed", dest="speed", type=spin, metavar="RAD_S", help="default: 0.3 rad/s"
-    )
-    add_output(parser, "--over-time", "FILE.csv", "write the motion of the last turn")
-    add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_output(
-        parser,
-        "--picture",
-        "FILE.png",
-        "draw the walks, or their values against legs, stiffness or slip",
-    )
+ARGUMENTS = (
+    ("--foot A,B,... (LTF)", "feet"),
+    ("--legs N,... (5)", "numbers of legs, 1 to 6"),
+    ("--ground A,B,...", "soils of table I (default: all four)"),
+    ("--stiffness K,...", "stiffnesses in N/m^3, in place of --ground"),
+    ("--slip S,...", "commanded slips; without it the wheel rolls freely"),
+    ("--offset", "with the stress at the surface"),
+    ("--mass KG", "carried (default: 3.75 kg)", NumberFrom(0.01, 1e5, "kg")),
+    ("--angular-speed RAD_S", "default: 0.3 rad/s", NumberFrom(1e-3, 100.0, "rad/s")),
+    ("--over-time FILE.csv", "write the motion of the last turn", OutputFile),
+    ("--out FILE.csv", "write the table to this file", OutputFile),
+    ("--picture FILE.png", "draw the walks, or values against legs, stiffness, slip", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -80,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
             raise InputError(
                 f"--slip is {slip:g}; needed is 1 - v/(r omega), between -1 and 1, not per cent"
             )
-    given = {"mass": args.mass, "speed": args.speed}
+    given = {"mass": args.mass, "speed": args.angular_speed}
     changes = {name: value for name, value in given.items() if value is not None}
     with working("simulating the walks"):
         found = walk_tables(feet, counts.astype(int).tolist(), _grounds(args), slips, **changes)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.option_values import NumberFrom
-from soilml.cli.options import InputFile, add_by_option, add_ignore_extra_option, add_output
+from soilml.cli.options import InputFile, OutputFile
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -49,51 +48,18 @@ another train a file on its strides: soilml train slip_torque.
 SENSORS = {"torque_Nm": "torque", "vibration_m_s2": "vibration", "sinkage_m": "sinkage"}
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "runs", type=InputFile, metavar="STRIDES.csv", help="strides: CSV, Parquet or .xlsx"
-    )
-    parser.add_argument(
-        "--torque-model",
-        default="simplified",
-        metavar="NAME",
-        help="terramechanics, empirical or simplified (default), which needs one stride",
-    )
-    parser.add_argument(
-        "--vibration-model",
-        default="linear",
-        metavar="NAME",
-        help="planar, or linear (default), which needs one stride",
-    )
-    parser.add_argument(
-        "--assume",
-        metavar="NAME=VALUE,...",
-        help="n, cohesion (Pa) or shear_modulus (m) of the soil, where they are known",
-    )
-    parser.add_argument(
-        "--wheel",
-        metavar="R,B,N",
-        help="radius and width (m) and load (N) of the heavy rover's wheel "
-        "(default: 0.15,0.18,490.5)",
-    )
-    parser.add_argument(
-        "--known", metavar="SOIL", help="name of table I, or degrees,Pa: give the slip on this soil"
-    )
-    parser.add_argument(
-        "--torque-std", type=NumberFrom(0.0, 1e6, "N m"), default=0.0, metavar="NM", help="std, N m"
-    )
-    parser.add_argument(
-        "--vibration-std",
-        type=NumberFrom(0.0, 1e4, "m/s^2"),
-        default=0.0,
-        metavar="M_S2",
-        help="std, m/s^2",
-    )
-    add_by_option(parser)
-    add_ignore_extra_option(parser)
-    add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_output(parser, "--picture", "FILE.png", "draw the soil by sensor, or the slip by stride")
+ARGUMENTS = (
+    ("runs STRIDES.csv", "strides: CSV, Parquet or .xlsx", InputFile),
+    ("--torque-model NAME (simplified)", "terramechanics, empirical or simplified"),
+    ("--vibration-model NAME (linear)", "planar, or linear, which needs one stride"),
+    ("--assume NAME=VALUE,...", "n, cohesion (Pa) or shear_modulus (m) where they are known"),
+    ("--wheel R,B,N", "of the heavy rover: m, m and load in N (default: 0.15,0.18,490.5)"),
+    ("--known SOIL", "name of table I, or degrees,Pa: give the slip on this soil"),
+    "by",
+    "ignore-extra",
+    ("--out FILE.csv", "write the table to this file", OutputFile),
+    ("--picture FILE.png", "draw the soil by sensor, or the slip by stride", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -110,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
     """The options that soil and slip share."""
-    names = ("torque_model", "vibration_model", "torque_std", "vibration_std")
+    names = ("torque_model", "vibration_model")
     return {name: getattr(args, name) for name in names}
 
 
@@ -144,7 +110,7 @@ def _known_soil(text: str) -> tuple[float, float]:
     import math
 
     from soilml.cli.option_values import parse_numbers
-    from soilml.systems.wheel_legs import GROUNDS
+    from soilml.systems.wheel_legs.resistive_force import GROUNDS
 
     if text.upper() in GROUNDS:
         ground = GROUNDS[text.upper()]

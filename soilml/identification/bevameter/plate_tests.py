@@ -151,32 +151,16 @@ class PlateCurve:
 
 @dataclass(frozen=True)
 class PressureSinkageFit:
-    r"""Bekker's law fitted to N tests: :math:`p(z_0, b) = A + B / b` and the exponent n.
-
-    Attributes
-    ----------
-    tests, curves
-        The tests, and the law fitted to each.
-    depth
-        Reference depth z_0 (m), where pressure and exponent are least correlated.
-    sizes
-        Distinct sizes b of the plates (m).
-    pressure
-        A (Pa) and B (Pa m) at the reference depth, (2,); B is 0 where there is one size.
-    exponent
-        n.
-    mean_draws, place_draws
-        Draws (draws, 3) of A, B and n: of the mean, and of another place of the soil.
-    """
+    r"""Bekker's law fitted to N tests: :math:`p(z_0, b) = A + B / b` and the exponent n."""
 
     tests: tuple[PlateTest, ...]
-    curves: tuple[PlateCurve, ...]
-    depth: float
-    sizes: tuple[float, ...]
-    pressure: Floats
-    exponent: float
-    mean_draws: Floats
-    place_draws: Floats
+    curves: tuple[PlateCurve, ...]  # the law fitted to each
+    depth: float  # z_0 (m), where pressure and exponent are least correlated
+    sizes: tuple[float, ...]  # distinct sizes b of the plates, m
+    pressure: Floats  # A (Pa) and B (Pa m) at the reference depth; B is 0 where there is one size
+    exponent: float  # n
+    mean_draws: Floats  # (draws, 3) of A, B and n: of the mean
+    place_draws: Floats  # and of another place of the soil
 
     @property
     def several_sizes(self) -> bool:
@@ -192,34 +176,27 @@ class PressureSinkageFit:
     def modulus(self, width: float) -> SpreadEstimate:
         """kc / b + kphi for a width b (m)."""
         kc, kphi = self.moduli
-        mean, place = (
-            (d[:, 0] + d[:, 1] / width) * self.depth ** -d[:, 2]
-            for d in (self.mean_draws, self.place_draws)
-        )
-        return spread_estimate(kc / width + kphi, mean, place, "N/m^(n+2)")
+        value, unit = kc / width + kphi, "N/m^(n+2)"
+        return self._estimate(value, unit, lambda d: (d[0] + d[1] / width) * self.depth ** -d[2])
 
     def pressure_at_depth(self, size: float) -> SpreadEstimate:
         """Pressure at the reference depth under a plate of a size (m)."""
-        mean, place = (d[:, 0] + d[:, 1] / size for d in (self.mean_draws, self.place_draws))
         value = float(self.pressure @ [1.0, 1.0 / size])
-        return spread_estimate(value, mean, place, "Pa")
+        return self._estimate(value, "Pa", lambda d: d[0] + d[1] / size)
 
     def estimates(self) -> dict[str, SpreadEstimate]:
         """What the tests determine: n, and kc with kphi, or k for the one width tested."""
-        found = {"n": spread_estimate(self.exponent, *self._draws(2), "1")}
+        found = {"n": self._estimate(self.exponent, "1", lambda d: d[2])}
         if not self.several_sizes:
             return found | {"k": self.modulus(self.sizes[0])}
         kc, kphi = self.moduli
-        found["kc"] = spread_estimate(kc, *self._draws(1, scaled=True), "N/m^(n+1)")
-        found["kphi"] = spread_estimate(kphi, *self._draws(0, scaled=True), "N/m^(n+2)")
+        z = self.depth
+        found["kc"] = self._estimate(kc, "N/m^(n+1)", lambda d: d[1] * z ** -d[2])
+        found["kphi"] = self._estimate(kphi, "N/m^(n+2)", lambda d: d[0] * z ** -d[2])
         return found
 
-    def _draws(self, column: int, *, scaled: bool = False) -> tuple[Floats, Floats]:
-        mean, place = (
-            d[:, column] * (self.depth ** -d[:, 2] if scaled else 1.0)
-            for d in (self.mean_draws, self.place_draws)
-        )
-        return mean, place
+    def _estimate(self, value: float, unit: str, of: Callable[[Floats], Floats]) -> SpreadEstimate:
+        return spread_estimate(value, of(self.mean_draws.T), of(self.place_draws.T), unit)
 
 
 def fit_pressure_sinkage(tests: Sequence[PlateTest]) -> PressureSinkageFit:
@@ -260,7 +237,7 @@ def _reference_depth(tests: Sequence[PlateTest]) -> float:
 
 def _fit_curve(test: PlateTest, depth: float) -> PlateCurve:
     x, y = np.log(test.sinkage / depth), np.log(test.pressure)
-    exponent, level = _slope(x, y, test.pressure)
+    exponent, level = np.polyfit(x, y, 1, w=test.pressure)
     residual = test.pressure * (y - level - exponent * x)
     misfit = float(np.sqrt(np.sum(residual**2) / np.sum(test.pressure**2)))
     low = max(float(test.sinkage[0]), SHALLOW * float(test.sinkage[-1]))
@@ -269,15 +246,9 @@ def _fit_curve(test: PlateTest, depth: float) -> PlateCurve:
     deep = x >= middle
     halves = float("nan"), float("nan")
     if shallow.sum() >= 2 and deep.sum() >= 2:
-        first, second = (_slope(x[h], y[h], np.ones(h.sum()))[0] for h in (shallow, deep))
+        first, second = (float(np.polyfit(x[h], y[h], 1)[0]) for h in (shallow, deep))
         halves = first, second
-    return PlateCurve(level, exponent, halves, misfit)
-
-
-def _slope(x: Floats, y: Floats, weight: Floats) -> tuple[float, float]:
-    """Slope and intercept of a weighted straight line."""
-    slope, level = np.polyfit(x, y, 1, w=weight)
-    return float(slope), float(level)
+    return PlateCurve(float(level), float(exponent), halves, misfit)
 
 
 def _exponent_span(curves: Sequence[PlateCurve], exponent: float) -> tuple[float, float]:

@@ -22,7 +22,6 @@ NOTABLE_MISFIT = 0.1  # Relative residual of a law from which it is said not to 
 NOTABLE_PEAK, NOTABLE_RISE = 1.1, 0.9
 #: Ratio of the end of a shear curve to the fitted one from which it is said to rise still.
 NOTABLE_END = 1.05
-NOTABLE_VARIATION = 0.05  # Variation of the normal stress within a test that is remarked on
 #: Ratio of shear strength to normal stress, and pressure (Pa), that suggest a wrong unit; and what
 #: no soil of the catalogue comes near: cohesion (Pa) and shear modulus (m).
 ODD_RATIO, ODD_PRESSURE = 6.0, 500.0
@@ -39,51 +38,31 @@ def plate_remarks(fit: PressureSinkageFit) -> Iterator[Remark]:
     """Remarks on plate tests."""
     largest = max(float(test.pressure.max()) for test in fit.tests)
     if largest < ODD_PRESSURE:
-        yield Remark(
-            "doubtful-unit",
-            f"the largest pressure is {largest:.3g} Pa, which is very little: check that it is in "
-            "Pa, not in kPa",
-            ("pressure_Pa",),
-        )
-    for size in fit.sizes[:LISTED]:
-        p = fit.pressure_at_depth(size)
-        yield Remark(
-            "pressure-at-depth",
-            f"at {fit.depth:.3g} m the plate of {size:.3g} m has a pressure of {_kpa(p.value)} "
-            f"kPa, {_kpa(p.another_place_95[0])} to {_kpa(p.another_place_95[1])} at another place",
-            ("kc", "kphi"),
-            "note",
-        )
-    depths = [float(test.sinkage[-1]) for test in fit.tests]
-    yield Remark(
-        "parameters-correlated",
-        "n and the moduli trade off, so each range alone is wide; they hold down to "
-        f"{max(depths):.3g} m, the deepest test",
-        ("kc", "kphi", "n"),
-        "note",
-    )
+        text = f"the largest pressure is {largest:.3g} Pa, which is very little: check that it is "
+        yield Remark("doubtful-unit", f"{text}in Pa, not in kPa", ("pressure_Pa",))
+    deepest = max(float(test.sinkage[-1]) for test in fit.tests)
+    text = "n and the moduli trade off, so each range alone is wide; they hold down to "
+    text += f"{deepest:.3g} m, the deepest test"
+    yield Remark("parameters-correlated", text, ("kc", "kphi", "n"), "note")
     if not fit.several_sizes:
-        yield Remark(
-            "one-plate-size",
-            f"one plate size ({fit.sizes[0]:.3g} m): kc and kphi are not identifiable, only "
-            f"k = kc / b + kphi for b = {fit.sizes[0]:.3g} m; for another width it may differ",
-            ("kc", "kphi"),
+        size = f"{fit.sizes[0]:.3g} m"
+        text = (
+            f"one plate size ({size}): kc and kphi are not identifiable, only k = kc / b + kphi "
+            f"for b = {size}; for another width it may differ"
         )
+        yield Remark("one-plate-size", text, ("kc", "kphi"))
     elif fit.estimates()["kc"].mean_95[0] < 0.0 < fit.estimates()["kc"].mean_95[1]:
         sizes = ", ".join(f"{b:.3g}" for b in fit.sizes)
-        yield Remark(
-            "sign-uncertain",
-            f"kc may be below or above zero: plates of {sizes} m differ by no more than repeats "
-            "do; use kc and kphi together, at widths between these",
-            ("kc",),
+        text = (
+            f"kc may be below or above zero: plates of {sizes} m "
+            "differ by no more than repeats do; use kc and kphi together, at widths between these"
         )
+        yield Remark("sign-uncertain", text, ("kc",))
     elif fit.moduli[0] < 0.0:
-        yield Remark(
-            "below-zero",
+        text = (
             "kc is below zero: larger plates carry more pressure; do not use it for widths below "
-            f"{fit.sizes[0]:.3g} m",
-            ("kc",),
         )
+        yield Remark("below-zero", f"{text}{fit.sizes[0]:.3g} m", ("kc",))
     yield from _repeats(
         np.asarray([test.size for test in fit.tests]),
         np.exp([curve.log_pressure for curve in fit.curves]),
@@ -93,21 +72,16 @@ def plate_remarks(fit: PressureSinkageFit) -> Iterator[Remark]:
     halves = np.asarray([c.halves for c in fit.curves if np.isfinite(c.halves).all()])
     if halves.size and abs(np.diff(halves.mean(axis=0))[0]) > NOTABLE_BEND:
         shallow, deep = halves.mean(axis=0)
-        yield Remark(
-            "exponent-depends-on-depth",
+        text = (
             "the logarithms of pressure and sinkage are not on a straight line: the exponent is "
             f"{shallow:.2f} in the shallower and {deep:.2f} in the deeper half, so n depends on "
-            "the depth; its range contains both",
-            ("n",),
+            "the depth; its range contains both"
         )
+        yield Remark("exponent-depends-on-depth", text, ("n",))
     yield from _poor_fits([(t.name, c.misfit) for t, c in zip(fit.tests, fit.curves, strict=True)])
-    omitted = sum(test.omitted for test in fit.tests)
-    if omitted:
-        yield Remark(
-            "samples-omitted",
-            f"{omitted} samples without pressure, or less deep than an earlier one, are left out",
-            severity="note",
-        )
+    if omitted := sum(test.omitted for test in fit.tests):
+        text = f"{omitted} samples without pressure, or less deep than an earlier one, are left out"
+        yield Remark("samples-omitted", text, severity="note")
 
 
 def _repeats(
@@ -129,45 +103,33 @@ def _repeats(
 
 def shear_remarks(fit: ShearFit) -> Iterator[Remark]:
     """Remarks on shear tests."""
-    ratio = max(c.strength / t.normal_stress for t, c in zip(fit.tests, fit.curves, strict=True))
+    pairs = list(zip(fit.tests, fit.curves, strict=True))
+    stresses = ("shear_stress_Pa", "normal_stress_Pa")
+    ratio = max(c.strength / t.normal_stress for t, c in pairs)
     if ratio > ODD_RATIO:
-        yield Remark(
-            "doubtful-unit",
-            f"the shear strength is {ratio:.3g} times the normal stress: check that both are in Pa",
-            ("shear_stress_Pa", "normal_stress_Pa"),
-        )
+        text = f"the shear strength is {ratio:.3g} times the normal stress: check that both are "
+        yield Remark("doubtful-unit", f"{text}in Pa", stresses)
     if fit.shear_modulus is None:
-        yield Remark(
-            "not-measured",
-            "the tests have strengths alone, no stress over displacement: K is not measured",
-            ("shear_modulus",),
-        )
+        text = "the tests have strengths alone, no stress over displacement: K is not measured"
+        yield Remark("not-measured", text, ("shear_modulus",))
     if fit.cohesion is None:
-        yield Remark(
-            "one-normal-stress",
+        text = (
             f"one normal stress ({_kpa(fit.stresses[0])} kPa): cohesion and friction angle are "
-            f"not identifiable, only c + sigma tan(phi) = {_kpa(fit.strength.value)} kPa there",
-            ("cohesion", "friction_angle"),
+            f"not identifiable, only c + sigma tan(phi) = {_kpa(fit.strength.value)} kPa there"
         )
+        yield Remark("one-normal-stress", text, ("cohesion", "friction_angle"))
     elif fit.cohesion.value == 0.0:
-        yield Remark(
-            "below-zero",
-            "the failure line meets the axis below zero: cohesion is set to zero",
-            ("cohesion",),
-        )
+        text = "the failure line meets the axis below zero: cohesion is set to zero"
+        yield Remark("below-zero", text, ("cohesion",))
     elif fit.cohesion.value > ODD_COHESION:
-        yield Remark(
-            "doubtful-unit",
-            f"the cohesion is {_kpa(fit.cohesion.value)} kPa, more than that of any soil: check "
-            "the unit of the stresses",
-            ("shear_stress_Pa", "normal_stress_Pa"),
-        )
+        text = f"the cohesion is {_kpa(fit.cohesion.value)} kPa, more than that of any soil: check "
+        yield Remark("doubtful-unit", f"{text}the unit of the stresses", stresses)
     if fit.shear_modulus is not None and fit.shear_modulus.value > ODD_MODULUS:
-        yield Remark(
-            "doubtful-unit",
+        text = (
             f"K is {1e3 * fit.shear_modulus.value:.3g} mm, more than that of any soil: check the "
-            "unit of the shear displacement",
-            ("shear_displacement_m",),
+        )
+        yield Remark(
+            "doubtful-unit", f"{text}unit of the shear displacement", ("shear_displacement_m",)
         )
     yield from _repeats(
         np.asarray([test.normal_stress for test in fit.tests]),
@@ -177,70 +139,45 @@ def shear_remarks(fit: ShearFit) -> Iterator[Remark]:
         "one of 8 % in strength",
     )
     if fit.halves:
-        (c0, phi0), (c1, phi1) = fit.halves
-        yield Remark(
-            "curved-failure-line",
+        low, high = (
+            f"{_kpa(c)} kPa and phi = {math.degrees(phi):.1f} deg" for c, phi in fit.halves
+        )
+        text = (
             "the failure line is curved: cohesion and friction angle depend on the normal stress, "
-            f"c = {_kpa(c0)} kPa and phi = {math.degrees(phi0):.1f} deg in the lighter half of the "
-            f"tests, {_kpa(c1)} kPa and {math.degrees(phi1):.1f} deg in the heavier; the ranges "
-            "contain both",
-            ("cohesion", "friction_angle"),
+            f"c = {low} in the lighter half of the tests, c = {high} in the heavier; the ranges "
+            "contain both"
         )
-    if fit.modulus_trend:
-        moduli = [curve.modulus for curve in fit.curves]
-        way = "grows" if fit.modulus_trend > 0.0 else "falls"
-        yield Remark(
-            "modulus-depends-on-stress",
-            f"K {way} with the normal stress: {1e3 * min(moduli):.2g} to {1e3 * max(moduli):.2g} "
-            "mm in these tests; its range contains them",
-            ("shear_modulus",),
+        yield Remark("curved-failure-line", text, ("cohesion", "friction_angle"))
+    falls = {
+        t.name: f"{t.name} {_kpa(c.peak)} to {_kpa(c.end)} kPa"
+        for t, c in pairs
+        if c.peak > NOTABLE_PEAK * c.end
+    }
+    if falls:
+        text = (
+            "the stress passes a peak and falls to a residual "
+            f"({', '.join(list(falls.values())[:LISTED])}); the curve of Janosi and "
+            "Hanamoto has none: its strength lies between. The effect shear-softening describes it"
         )
-    yield from _shapes(fit)
-    yield from _poor_fits([(t.name, c.misfit) for t, c in zip(fit.tests, fit.curves, strict=True)])
-    varying = [t.name for t in fit.tests if t.normal_variation > NOTABLE_VARIATION]
-    if varying:
-        yield Remark(
-            "normal-stress-varies",
-            f"the normal stress varies by more than 5 % within {_list(varying)}; its mean is used",
-            tuple(varying),
-        )
-
-
-def _shapes(fit: ShearFit) -> Iterator[Remark]:
-    pairs = list(zip(fit.tests, fit.curves, strict=True))
-    peaked = [(t, c) for t, c in pairs if c.peak > NOTABLE_PEAK * c.end]
-    if peaked:
-        falls = ", ".join(
-            f"{t.name} {_kpa(c.peak)} to {_kpa(c.end)} kPa" for t, c in peaked[:LISTED]
-        )
-        yield Remark(
-            "peak",
-            f"the stress passes a peak and falls to a residual ({falls}); the curve of Janosi and "
-            "Hanamoto has none: its strength lies between. The effect shear-softening describes it",
-            tuple(t.name for t, _ in peaked),
-        )
+        yield Remark("peak", text, tuple(falls))
     rising = [
         t.name
         for t, c in pairs
         if c.mobilised < NOTABLE_RISE or c.end > NOTABLE_END * c.mobilised * c.strength
     ]
     if rising:
-        yield Remark(
-            "still-rising",
+        text = (
             f"the stress still rises at the end of {_list(rising)}: strength and K depend on how "
-            "far the test goes",
-            tuple(rising),
         )
+        yield Remark("still-rising", f"{text}far the test goes", tuple(rising))
+    yield from _poor_fits([(t.name, c.misfit) for t, c in pairs])
 
 
 def _poor_fits(misfits: Sequence[tuple[str, float]]) -> Iterator[Remark]:
     poor = {name: f"{name} ({m:.0%})" for name, m in misfits if m > NOTABLE_MISFIT}
     if poor:
-        yield Remark(
-            "poor-fit",
-            f"the law fits poorly, by its relative residual: {_list(list(poor.values()))}",
-            tuple(poor),
-        )
+        text = f"the law fits poorly, by its relative residual: {_list(list(poor.values()))}"
+        yield Remark("poor-fit", text, tuple(poor))
 
 
 def _list(names: Sequence[str]) -> str:

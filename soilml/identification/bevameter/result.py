@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
@@ -69,11 +70,12 @@ class BevameterResult(Result):
             Column.of_ranges("95 % of the mean", mean, units, values),
             Column.of_ranges("95 % elsewhere", place, units, values),
         ]
-        count = sum(len(fit.tests) for fit in (self.plates, self.shear) if fit is not None)
+        tests = sum(len(fit.tests) for fit in (self.plates, self.shear) if fit is not None)
         names = ", ".join(name.replace("_", " ") for name in found)
         open_ = self.shear is not None and self.shear.shear_modulus is None
-        verdict = f"{count} tests determine {names}."
-        size = (4.6 * _panels(self), 3.9)
+        verdict = f"{tests} tests determine {names}."
+        drawings = _drawings(self)
+        count, size = len(drawings), (4.6 * len(drawings), 3.9)
         return Report(
             kind="bevameter",
             verdict=verdict,
@@ -81,7 +83,7 @@ class BevameterResult(Result):
             tables=[ReportTable("Soil by tests", columns, "Elsewhere: another place.")],
             pictures=[
                 Picture(
-                    "Tests", partial(_draw, self), 1, _panels(self), size, verdict,
+                    "Tests", partial(_draw, drawings), 1, count, size, verdict,
                     "Dots: measured. Thin lines: fitted to each test. Thick lines: the result.",
                 )
             ],
@@ -141,23 +143,23 @@ def _shear_entries(fit: ShearFit) -> list[dict[str, Any]]:
     ]
 
 
-def _draw(result: BevameterResult, axes: Any) -> None:
-    """Draw pressure against sinkage, shear curves, and strengths with their line."""
-    panels = list(np.ravel(axes))
+def _drawings(result: BevameterResult) -> list[Callable[[Any], None]]:
+    """What draws each panel: pressure against sinkage, shear curves, strengths with their line."""
+    found: list[Callable[[Any], None]] = []
     if result.plates is not None:
-        _draw_plates(panels.pop(0), result.plates)
+        found.append(partial(_draw_plates, fit=result.plates))
     if result.shear is not None:
-        if _has_curves(result):
-            _draw_curves(panels.pop(0), result.shear)
-        _draw_strengths(panels.pop(0), result.shear)
+        if any(test.has_curve for test in result.shear.tests):
+            found.append(partial(_draw_curves, fit=result.shear))
+        found.append(partial(_draw_strengths, fit=result.shear))
+    return found
 
 
-def _panels(result: BevameterResult) -> int:
-    return (result.plates is not None) + (result.shear is not None) + _has_curves(result)
-
-
-def _has_curves(result: BevameterResult) -> bool:
-    return result.shear is not None and any(test.has_curve for test in result.shear.tests)
+def _draw(drawings: Sequence[Callable[[Any], None]], axes: Any) -> None:
+    for panel, drawing in zip(np.ravel(axes), drawings, strict=True):
+        drawing(panel)
+        if len(panel.get_legend_handles_labels()[1]) <= LISTED:
+            panel.legend()
 
 
 def _draw_plates(panel: Any, fit: PressureSinkageFit) -> None:
@@ -179,7 +181,6 @@ def _draw_plates(panel: Any, fit: PressureSinkageFit) -> None:
     for axis in (panel.xaxis, panel.yaxis):
         axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter("")
-    _finish(panel, len(fit.tests))
 
 
 def _draw_curves(panel: Any, fit: ShearFit) -> None:
@@ -194,7 +195,6 @@ def _draw_curves(panel: Any, fit: ShearFit) -> None:
         panel.plot(1e3 * grid, 1e-3 * own, color=dots.get_color(), linewidth=0.8)
     panel.set_xlabel("shear displacement, mm")
     panel.set_ylabel("shear stress, kPa")
-    _finish(panel, len(fit.tests))
 
 
 def _draw_strengths(panel: Any, fit: ShearFit) -> None:
@@ -209,9 +209,3 @@ def _draw_strengths(panel: Any, fit: ShearFit) -> None:
     panel.set_ylim(bottom=0.0)
     panel.set_xlabel("normal stress, kPa")
     panel.set_ylabel("shear strength, kPa")
-    _finish(panel, 1)
-
-
-def _finish(panel: Any, tests: int) -> None:
-    if tests <= LISTED:
-        panel.legend()

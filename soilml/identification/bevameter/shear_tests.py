@@ -31,9 +31,9 @@ UPPER_MODULUS = 2.0  # in largest displacements: beyond, a curve is a straight l
 STEP = 0.01
 MOST_STRENGTHS = 10  # Rows of one name and one normal stress that are strengths of repeats
 END = 0.2  # Last part of a curve, as a fraction of its displacement, whose mean is its end
-LEAST_LOADS = 4  # Loads from which on a bend of the failure line, or a trend of K, is looked for
-#: Studentised size of a bend or trend from which it is reported: chance gives it in 1 of 50 tables
-#: of five tests.
+LEAST_LOADS = 4  # Loads from which on a bend of the failure line is looked for
+#: Studentised size of a bend from which it is reported: chance gives it in 1 of 50 tables of five
+#: tests.
 SIGNIFICANT = 3.0
 
 
@@ -49,7 +49,6 @@ class ShearTest:
     normal_stress: float
     displacement: Floats
     stress: Floats
-    normal_variation: float  # largest relative deviation of the normal stress from its mean
 
     @property
     def has_curve(self) -> bool:
@@ -168,12 +167,11 @@ def _test(
         )
     curve = np.isfinite(j)
     mean = float(sigma.mean())
-    variation = float(np.abs(sigma / mean - 1.0).max())
     if not curve.any():
-        return ShearTest(name, mean, np.asarray([np.inf]), np.asarray([stress.mean()]), variation)
+        return ShearTest(name, mean, np.asarray([np.inf]), np.asarray([stress.mean()]))
     means = thinned(j[curve], stress[curve])
     j, stress = (np.append(a, b[~curve]) for a, b in zip(means, (j, stress), strict=True))
-    return ShearTest(name, mean, j, stress, variation)
+    return ShearTest(name, mean, j, stress)
 
 
 @dataclass(frozen=True)
@@ -195,36 +193,18 @@ class ShearCurve:
 
 @dataclass(frozen=True)
 class ShearFit:
-    """Mohr and Coulomb's line through the strengths of N tests, and K.
-
-    Attributes
-    ----------
-    tests, curves
-        The tests, and the curve fitted to each.
-    stresses
-        Distinct normal stresses (Pa).
-    cohesion, friction_angle
-        Estimates (Pa, rad); None where there is one normal stress.
-    strength
-        Shear strength (Pa) at the mean normal stress.
-    shear_modulus
-        K (m), the geometric mean of the tests; None where none has a curve.
-    halves
-        (c, phi) of the lighter and of the heavier half of the loads where the failure line is
-        curved; else empty.
-    modulus_trend
-        Exponent of K in the normal stress where it differs from zero; else 0.
-    """
+    """Mohr and Coulomb's line through the strengths of N tests, and K."""
 
     tests: tuple[ShearTest, ...]
-    curves: tuple[ShearCurve, ...]
-    stresses: tuple[float, ...]
-    cohesion: SpreadEstimate | None
-    friction_angle: SpreadEstimate | None
-    strength: SpreadEstimate
-    shear_modulus: SpreadEstimate | None
+    curves: tuple[ShearCurve, ...]  # fitted to each
+    stresses: tuple[float, ...]  # distinct normal stresses, Pa
+    cohesion: SpreadEstimate | None  # Pa; None where there is one normal stress
+    friction_angle: SpreadEstimate | None  # rad; likewise
+    strength: SpreadEstimate  # at the mean normal stress, Pa
+    shear_modulus: SpreadEstimate | None  # geometric mean, m; None where none has a curve
+    #: (c, phi) of the lighter and of the heavier half of the loads where the failure line is
+    #: curved; else empty
     halves: tuple[tuple[float, float], ...]
-    modulus_trend: float
 
     def estimates(self) -> dict[str, SpreadEstimate]:
         """What the tests determine, by name."""
@@ -278,31 +258,19 @@ def fit_shear_strength(tests: Sequence[ShearTest]) -> ShearFit:
     halves = _halves(sigma, strength) if len(stresses) >= LEAST_LOADS else ()
     c = phi = None
     if p == 2:
-        c = _with(
-            spread_estimate(
-                float(line[0]), _above_zero(draws[:, 0]), _above_zero(other[:, 0]), "Pa"
-            ),
-            [max(half[0], 0.0) for half in halves],
-        )
-        angle, other_angle = (np.arctan(_above_zero(d[:, 1])) for d in (draws, other))
-        phi = _with(
-            spread_estimate(float(np.arctan(max(line[1], 0.0))), angle, other_angle, "rad"),
-            [half[1] for half in halves],
-        )
-    several = len(distinct_levels(sigma[recorded])) >= LEAST_LOADS if recorded.any() else False
-    return ShearFit(
-        tuple(tests),
-        curves,
-        stresses,
-        c,
-        phi,
-        spread_estimate(float(line @ at), draws @ at, other @ at, "Pa"),
-        spread_estimate(float(np.exp(mean_log)), modulus, modulus * np.exp(deviation[:, 1]), "m")
-        if recorded.any()
-        else None,
-        halves,
-        _trend(np.log(sigma[recorded]), log_modulus[recorded]) if several else 0.0,
-    )
+        above = [np.maximum(d, 0.0) for d in (line[None, :], draws, other)]
+        value, mean, place = (d[:, 0] for d in above)
+        c = spread_estimate(float(value[0]), mean, place, "Pa")
+        c = _with(c, [max(half[0], 0.0) for half in halves])
+        value, mean, place = (np.arctan(d[:, 1]) for d in above)
+        phi = spread_estimate(float(value[0]), mean, place, "rad")
+        phi = _with(phi, [half[1] for half in halves])
+    k = None
+    if recorded.any():
+        elsewhere = modulus * np.exp(deviation[:, 1])
+        k = spread_estimate(float(np.exp(mean_log)), modulus, elsewhere, "m")
+    total = spread_estimate(float(line @ at), draws @ at, other @ at, "Pa")
+    return ShearFit(tuple(tests), curves, stresses, c, phi, total, k, halves)
 
 
 def fit_shear_curve(test: ShearTest) -> ShearCurve:
@@ -357,19 +325,6 @@ def _halves(sigma: Floats, strength: Floats) -> tuple[tuple[float, float], ...]:
         c, slope = relative_line(own, strength[part])[0]
         halves.append((float(c), float(np.arctan(max(slope, 0.0)))))
     return tuple(halves)
-
-
-def _trend(x: Floats, y: Floats) -> float:
-    """Slope of a straight line where it differs from zero; else 0."""
-    x = x - x.mean()
-    slope = float(x @ y / (x @ x))
-    residual = y - y.mean() - slope * x
-    std = np.sqrt(max(float(residual @ residual), 1e-12) / (x.size - 2) / (x @ x))
-    return slope if abs(slope) > SIGNIFICANT * std else 0.0
-
-
-def _above_zero(values: Floats) -> Floats:
-    return np.maximum(values, 0.0)
 
 
 def _with(estimate: SpreadEstimate, values: Sequence[float]) -> SpreadEstimate:

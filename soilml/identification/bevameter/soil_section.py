@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -119,11 +119,9 @@ def within_bounds(values: Mapping[str, float]) -> dict[str, float]:
 
 def widths_of_gears(case: Case | None) -> tuple[float, ...]:
     """Distinct widths of the gears of a case (m); none where a gear has no width."""
-    if case is None:
-        return ()
-    models: Iterable[object] = (m.gear for m in case.gears.values()) if case.gears else ()
-    gears = list(models) or [case.model.gear]
-    return tuple(dict.fromkeys(float(g.width) for g in gears if hasattr(g, "width")))
+    models = () if case is None else tuple(case.gears.values()) or (case.model,)
+    widths = (getattr(model.gear, "width", None) for model in models)
+    return tuple(dict.fromkeys(float(width) for width in widths if width is not None))
 
 
 def _prior(name: str, value: float, span: tuple[float, float]) -> Prior:
@@ -152,28 +150,19 @@ def pressure_test(fit: PressureSinkageFit, case: Case | None) -> PlatePressure |
         if any(max(w / width, width / w) > LEAST_SIZE_RATIO for w in widths):
             return None
     pressure = fit.pressure_at_depth(width)
-    scatter = _scatter(pressure)
-    if scatter is None:
+    if (scatter := _scatter(pressure)) is None:
         return None
-    return PlatePressure(
-        plate_width=round_significant(width),
-        sinkage=round_significant(fit.depth),
-        pressure=round_significant(pressure.value),
-        scatter=scatter,
-    )
+    width, depth, value = map(round_significant, (width, fit.depth, pressure.value))
+    return PlatePressure(plate_width=width, sinkage=depth, pressure=value, scatter=scatter)
 
 
 def strength_test(fit: ShearFit) -> ShearStrength | None:
     """The strength under the mean normal stress, where cohesion and friction trade off least."""
-    scatter = _scatter(fit.strength)
-    if scatter is None:
+    if (scatter := _scatter(fit.strength)) is None:
         return None
-    stress = float(np.mean([test.normal_stress for test in fit.tests]))
-    return ShearStrength(
-        normal_stress=round_significant(stress),
-        strength=round_significant(fit.strength.value),
-        scatter=scatter,
-    )
+    mean = float(np.mean([test.normal_stress for test in fit.tests]))
+    stress, strength = map(round_significant, (mean, fit.strength.value))
+    return ShearStrength(normal_stress=stress, strength=strength, scatter=scatter)
 
 
 def _scatter(estimate: SpreadEstimate) -> float | None:

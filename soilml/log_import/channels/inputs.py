@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,10 +13,11 @@ from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.io.cell_text import read_number
 from soilml.log_import.channels.resampling import (
+    MOST_POINTS,
+    SHORTEST_STEP,
     derivative,
     on_grid,
     sampling_interval,
-    uniform_grid,
     unwrapped,
 )
 from soilml.log_import.channels.runs import Run
@@ -32,7 +34,8 @@ SMOOTH = 0.5  # Span of the derivative of places and angles, s
 _STANDS, _SHORTEST_REST, _BEFORE_START = 0.05, 0.4, 0.2
 #: Channels of a wheel-leg in which single wild samples are left out.
 _DESPIKED = ("torque", "motor_current", "load", "drawbar_pull", "sinkage", "clearance", "vibration")
-_PLACES = ("wheel_angle", "position")
+#: Roles that are places, and the role of their rate.
+_PLACES = {"wheel_angle": "wheel_speed", "position": "ground_speed"}
 _EFFORT = 0.1  # Share of the usual torque or current that is more than noise and offset
 
 
@@ -48,8 +51,7 @@ class Inputs:
     places: dict[str, Floats] = field(default_factory=dict)
     # Sampling interval of the places in the log, s, by role; on the grid they are interpolated
     intervals: dict[str, float] = field(default_factory=dict)
-    # Roles that do not vary, with their value
-    constants: dict[str, float] = field(default_factory=dict)
+    constants: dict[str, float] = field(default_factory=dict)  # Roles that do not vary
     # Mean at rest and its standard error by role; empty where the wheel never rests
     rest: dict[str, tuple[float, float]] = field(default_factory=dict)
     tare: dict[str, float] = field(default_factory=dict)  # What was subtracted by role
@@ -61,33 +63,42 @@ class Inputs:
         """Step of the grid, s."""
         return float(self.time[1] - self.time[0])
 
+    @property
+    def speed(self) -> Floats | None:
+        """The first speed that is known (n,): rotation, rim, travel."""
+        known = ("wheel_speed", "rim_speed", "ground_speed")
+        return next((self.values[role] for role in known if role in self.values), None)
+
+    def within(self, start: float, stop: float) -> NDArray[np.bool_]:
+        """Samples (n,) of a stretch."""
+        return np.asarray((self.time >= start) & (self.time <= stop))
+
 
 def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
     """The channels of a wheel in a run.
 
     Raises `InputError` for a column that the run lacks, and where channels do not overlap in time.
     """
-    raw: dict[str, list[tuple[Floats, Floats]]] = {}
-    constants = {}
-    for role, channel in wheel.channels.items():
-        if channel.columns:
-            raw[role] = [run.find(address) for address in channel.columns]
-        else:
-            constants[role] = channel_constant(run, channel)
+    channels = wheel.channels.items()
+    raw = {role: [run.find(a) for a in channel.columns] for role, channel in channels
+           if channel.columns}  # fmt: skip
+    constants = {role: channel_constant(run, channel) for role, channel in channels
+                 if not channel.columns}  # fmt: skip
     parts = [part for several in raw.values() for part in several]
     if not parts:
         raise InputError(f"run {run.name}: the map names no column")
     intervals = [sampling_interval(times, values) for times, values in parts]
     if not np.isfinite(min(intervals)):
         raise InputError(f"run {run.name}: no channel has two samples with a time")
-    starts = [times[0] for times, _ in parts]
-    stops = [times[-1] for times, _ in parts]
-    if not max(starts) < min(stops):
+    start, stop = max(times[0] for times, _ in parts), min(times[-1] for times, _ in parts)
+    if not start < stop:
         raise InputError(
-            f"run {run.name}: the recordings do not overlap in time ({max(starts):.6g} s to "
-            f"{min(stops):.6g} s); where their clocks differ, write clock = 'start' in [files]"
+            f"run {run.name}: the recordings do not overlap in time ({start:.6g} s to {stop:.6g} "
+            "s); where their clocks differ, write clock = 'start' in [files]"
         )
-    grid = uniform_grid(intervals, max(starts), min(stops))
+    # the step of the finest channel, within limits
+    step = max(min(intervals), SHORTEST_STEP, (stop - start) / MOST_POINTS)
+    grid: Floats = start + step * np.arange(int((stop - start) / step) + 1, dtype=np.float64)
     if grid.size < 8:
         raise InputError(f"run {run.name} has {grid.size} samples; needed are 8 or more")
     inputs = Inputs(grid, constants=constants)
@@ -96,41 +107,23 @@ def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
         if channel.unwrap:
             several = [(t, unwrapped(v, channel.unwrap)) for t, v in several]
         if wheel.leg is not None and role in _DESPIKED:
-            several = _despiked(inputs, role, several)
-        if role in _PLACES:
+            # single wild samples, which the largest acceleration of a stance would be
+            found = [(times, *without_spikes(values)) for times, values in several]
+            if count := sum(wild for *_, wild in found):
+                text = f"[{role}]: {count} single wild samples are left out"
+                inputs.notes.append(Remark("spikes", text, (role,), severity="note"))
+            several = [(times, values) for times, values, _ in found]
+        rate = _PLACES.get(role)
+        sampled = [on_grid(grid, t, v, continuous=rate is not None) for t, v in several]
+        if rate is None:
+            inputs.values[role] = combined(channel, sampled)
+        else:  # places are added with their rate
+            place = channel.scale * along_path(sampled)
             inputs.intervals[role] = max(sampling_interval(t, v) for t, v in several)
-        sampled = [on_grid(grid, t, v, continuous=role in _PLACES) for t, v in several]
-        _add(inputs, channel, sampled)
+            inputs.places[role] = place
+            inputs.values.setdefault(rate, derivative(grid, place, SMOOTH))
     _tare(inputs, wheel)
     return inputs
-
-
-def _despiked(
-    inputs: Inputs, role: str, several: list[tuple[Floats, Floats]]
-) -> list[tuple[Floats, Floats]]:
-    """Samples without single wild ones, which the largest acceleration of a stance would be."""
-    found = [(times, *without_spikes(values)) for times, values in several]
-    if count := sum(wild for *_, wild in found):
-        text = f"[{role}]: {count} single wild samples are left out"
-        inputs.notes.append(Remark("spikes", text, (role,), severity="note"))
-    return [(times, values) for times, values, _ in found]
-
-
-def _add(inputs: Inputs, channel: ChannelMap, sampled: list[Floats]) -> None:
-    """Add a channel in the units of soilml; places are added with their rate."""
-    role, grid = channel.role, inputs.time
-    if role == "position":
-        place = channel.scale * along_path(sampled)
-        inputs.places[role] = place
-        inputs.values.setdefault("ground_speed", derivative(grid, place, SMOOTH))
-    elif role == "wheel_angle":
-        place = channel.scale * sampled[0]
-        inputs.places[role] = place
-        inputs.values.setdefault("wheel_speed", derivative(grid, place, SMOOTH))
-    elif role == "slip":
-        inputs.values[role] = our_slip(channel.scale * sampled[0], channel.definition)
-    else:
-        inputs.values[role] = combined(channel, sampled)
 
 
 def combined(channel: ChannelMap, columns: list[Floats]) -> Floats:
@@ -141,6 +134,8 @@ def combined(channel: ChannelMap, columns: list[Floats]) -> Floats:
     if channel.role == "slope":
         return channel.scale * slope_of(columns)
     total = channel.scale * sum(columns[1:], start=columns[0])
+    if channel.role == "slip":
+        total = our_slip(total, channel.definition)
     return total / len(columns) if channel.role == "sinkage" else total
 
 
@@ -172,18 +167,15 @@ def channel_constant(run: Run, channel: ChannelMap) -> float:
     """A channel that no column is: a value, or a number that the log or its name states."""
     if channel.value is not None:
         return channel.value.value
-    if channel.head_pattern is not None:
-        key, place, texts = "head", "the lines before the header of", run.about
-        pattern = channel.head_pattern
-    else:
-        assert channel.name_pattern is not None
+    key, place, texts = "head", "the lines before the header of", run.about
+    pattern = channel.head_pattern
+    if pattern is None:
         key, place, texts, pattern = "file_name", "the name of", (run.name,), channel.name_pattern
+    assert pattern is not None
     for match in filter(None, map(pattern.search, texts)):
-        try:
+        with suppress(ValueError):
             number = channel.scale * read_number((match[1] or "").strip().replace(",", "."))
-        except ValueError:
-            continue
-        return float(our_slip(number, channel.definition)) if channel.role == "slip" else number
+            return float(our_slip(number, channel.definition)) if channel.role == "slip" else number
     raise InputError(
         f"{channel.where} {key} {pattern.pattern!r} finds no number in {place} the run {run.name!r}"
     )
@@ -191,9 +183,7 @@ def channel_constant(run: Run, channel: ChannelMap) -> float:
 
 def resting(inputs: Inputs) -> slice | None:
     """The stretch before the wheel starts, without its end; None where there is none."""
-    speed = inputs.values.get("wheel_speed", inputs.values.get("rim_speed"))
-    if speed is None:
-        speed = inputs.values.get("ground_speed", _effort(inputs))
+    speed = inputs.speed if inputs.speed is not None else _effort(inputs)
     if speed is None or not np.isfinite(speed).any():
         return None
     size = np.abs(speed)
@@ -209,12 +199,9 @@ def resting(inputs: Inputs) -> slice | None:
 
 def moving(inputs: Inputs) -> NDArray[np.bool_]:
     """Samples (n,) in which the wheel drives; all of them where no speed is known."""
-    speed = inputs.values.get("wheel_speed", inputs.values.get("rim_speed"))
-    if speed is None:
-        speed = inputs.values.get("ground_speed")
-    if speed is None:
+    if inputs.speed is None:
         return np.ones(inputs.time.size, dtype=bool)
-    size: Floats = np.abs(np.nan_to_num(speed))
+    size: Floats = np.abs(np.nan_to_num(inputs.speed))
     return np.asarray(size > 0.3 * np.percentile(size, 90))
 
 
@@ -234,27 +221,22 @@ def _effort(inputs: Inputs) -> Floats | None:
 def _tare(inputs: Inputs, wheel: WheelMap) -> None:
     rest = resting(inputs)
     for role, values in inputs.values.items():
-        channel = wheel.channels.get(role)
         if rest is not None:
-            mean, error = mean_error(values[rest], inputs.step)[:2]
-            inputs.rest[role] = (mean, error)
-        if channel is None or channel.tare is None:
+            inputs.rest[role] = mean_error(values[rest], inputs.step)[:2]
+        tare = wheel.channels[role].tare if role in wheel.channels else None
+        if tare is None:
             continue
-        if channel.tare == "rest":
-            if rest is None:
-                text = (
-                    f"[{role}] is not tared: the wheel does not rest at the start of the run; "
-                    "state a stretch, such as tare = [0.5, 3.0]"
-                )
-                inputs.notes.append(Remark("not-tared", text, (role,)))
-                continue
-            stretch = values[rest]
-        else:
-            assert isinstance(channel.tare, tuple)
-            start, stop = channel.tare
-            stretch = values[(inputs.time >= start) & (inputs.time <= stop)]
+        stretch = values[:0] if rest is None else values[rest]
+        if isinstance(tare, tuple):
+            stretch = values[inputs.within(*tare)]
         if np.isfinite(stretch).sum() < 5:
-            text = f"[{role}] is not tared: the stretch has fewer than 5 samples"
+            why = "the stretch has fewer than 5 samples"
+            if tare == "rest" and rest is None:
+                why = (
+                    "the wheel does not rest at the start of the run; state a stretch, such as "
+                    "tare = [0.5, 3.0]"
+                )
+            text = f"[{role}] is not tared: {why}"
             inputs.notes.append(Remark("not-tared", text, (role,)))
             continue
         zero, error = mean_error(stretch, inputs.step)[:2]

@@ -19,13 +19,6 @@ def sampling_interval(times: Floats, values: Floats) -> float:
     return float(np.median(np.diff(own))) if own.size > 1 else float("inf")
 
 
-def uniform_grid(intervals: list[float], start: float, stop: float) -> Floats:
-    """A grid (n,) from start to stop, s, with the step of the finest channel, within limits."""
-    step = max(min(intervals), SHORTEST_STEP, (stop - start) / MOST_POINTS)
-    points: Floats = np.arange(int((stop - start) / step) + 1, dtype=np.float64)
-    return start + step * points
-
-
 def on_grid(grid: Floats, times: Floats, values: Floats, continuous: bool = False) -> Floats:
     """Samples on a grid (n,), NaN in gaps.
 
@@ -83,21 +76,12 @@ def derivative(grid: Floats, values: Floats, span: float) -> Floats:
     weight = valid.astype(np.float64)
     filled = np.where(valid, values - (values[valid].mean() if valid.any() else 0.0), 0.0)
     time = step * (np.arange(n) - n / 2)
-    sums = [
-        _window_sum(part, half)
-        for part in (weight, weight * time, weight * time**2, filled, filled * time)
-    ]
-    count, t, tt, y, ty = sums
+    places = np.arange(n)
+    start, stop = np.maximum(places - half, 0), np.minimum(places + half + 1, n)
+    parts = np.stack([weight, weight * time, weight * time**2, filled, filled * time])
+    totals = np.pad(np.cumsum(parts, axis=1), ((0, 0), (1, 0)))
+    count, t, tt, y, ty = totals[:, stop] - totals[:, start]
     with np.errstate(invalid="ignore", divide="ignore"):
         spread = tt - t * t / count
         slope = (ty - t * y / count) / spread
     return np.where((count >= half + 1) & (spread > 0.0), slope, np.nan)
-
-
-def _window_sum(values: Floats, half: int) -> Floats:
-    """Sum of the values within `half` places, (n,)."""
-    total = np.concatenate([[0.0], np.cumsum(values)])
-    n = values.size
-    stop = np.minimum(np.arange(n) + half + 1, n)
-    start = np.maximum(np.arange(n) - half, 0)
-    return np.asarray(total[stop] - total[start])

@@ -11,7 +11,6 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
@@ -64,13 +63,8 @@ class Run:
 
 def _column_in(recording: Recording, address: str) -> str:
     """Name of the column of a recording that an address means; "" where it has none."""
-    if address in recording.columns:
-        return address
-    prefix = f"{recording.name}:"
-    if recording.name and address.startswith(prefix):
-        column = address.removeprefix(prefix)
-        return column if column in recording.columns else ""
-    return ""
+    names = [address, *([address.removeprefix(f"{recording.name}:")] if recording.name else [])]
+    return next((name for name in names if name in recording.columns), "")
 
 
 def _missing(recordings: Sequence[Recording], address: str) -> str:
@@ -102,9 +96,14 @@ def runs_of(logs: Sequence[Sequence[Recording]], log_map: LogMap) -> list[Run]:
     ]
 
 
-def as_rows(log: Sequence[Recording], name: str) -> Run:
-    """A log whose lines are numbered instead of timed."""
-    return Run(name, tuple(log), tuple(np.arange(float(len(own))) for own in log))
+def _labels(recordings: Sequence[Recording], column: str) -> tuple[int, list[str]]:
+    """Which recording has the column of runs, and its cells; raises `InputError` for none."""
+    at = [i for i, r in enumerate(recordings) if column in r.texts or column in r.columns]
+    if len(at) != 1:
+        raise InputError(f"[runs] column: {_missing(recordings, column)}")
+    own = recordings[at[0]]
+    cells = own.texts.get(column) or [f"{value:g}" for value in own.columns[column]]
+    return at[0], [cell or "unnamed" for cell in cells]
 
 
 def runs_of_rows(logs: Sequence[Sequence[Recording]], log_map: LogMap) -> list[Run]:
@@ -115,14 +114,8 @@ def runs_of_rows(logs: Sequence[Sequence[Recording]], log_map: LogMap) -> list[R
     runs, key = [], log_map.runs.column
     for name, log in zip(run_names([log[0].file for log in logs]), logs, strict=True):
         for recording in log:
-            whole = as_rows([recording], name)
-            if not key:
-                labels = [name] * len(recording)
-            elif key in recording.texts:
-                labels = [cell or "unnamed" for cell in recording.texts[key]]
-            else:
-                labels = [f"{value:g}" for value in whole.find(key)[1]]
-            number = whole.times[0]
+            labels = _labels([recording], key)[1] if key else [name] * len(recording)
+            number = np.arange(float(len(recording)))
             starts = [i for i, label in enumerate(labels) if i == 0 or label != labels[i - 1]]
             for start, stop in pairwise([*starts, len(labels)]):
                 keep = (number >= start) & (number < stop)
@@ -155,14 +148,11 @@ def files_by_run(
 ) -> dict[str, list[Member]]:
     """Recordings by the name of their run, of which some may lack a kind of file."""
     files = [log[0].file for log in logs]
-    names = run_names(files)
-    if not kinds:
-        return {
-            name: [(recording, None) for recording in log]
-            for name, log in zip(names, logs, strict=True)
-        }
     found: dict[str, list[Member]] = {}
-    for file, name, log in zip(files, names, logs, strict=True):
+    for file, name, log in zip(files, run_names(files), logs, strict=True):
+        if not kinds:
+            found[name] = [(recording, None) for recording in log]
+            continue
         matching = [k for k in kinds if fnmatch.filter((name, file.name), k.pattern)]
         if len(matching) != 1:
             known = ", ".join(f"{k.name} = {k.pattern!r}" for k in kinds)
@@ -181,21 +171,16 @@ def run_names(files: Sequence[Path]) -> list[str]:
 
     The name of a sheet of a spreadsheet stands behind that of its file.
     """
-    stems = [_stem(*split_sheet(file)) for file in files]
-    depth = 0
-    names = list(stems)
-    while len(set(names)) < len(names) and depth < 6:
-        depth += 1
-        names = [
-            "_".join((*file.parts[:-1][-depth:], stem))
-            for file, stem in zip(files, stems, strict=True)
-        ]
+    stems = [
+        "_".join(filter(None, (own.stem if own.suffix else own.name, sheet)))
+        for own, sheet in map(split_sheet, files)
+    ]
+    for depth in range(7):
+        folders = [file.parts[:-1][-depth:] if depth else () for file in files]
+        names = ["_".join((*own, stem)) for own, stem in zip(folders, stems, strict=True)]
+        if len(set(names)) == len(names):
+            break
     return names
-
-
-def _stem(file: Path, sheet: str) -> str:
-    stem = file.stem if file.suffix else file.name
-    return f"{stem}_{sheet}" if sheet else stem
 
 
 def _words(text: str) -> list[str]:
@@ -222,21 +207,20 @@ def _with_times(name: str, members: list[Member], log_map: LogMap) -> Run:
             continue
         spread = spread_over_seconds(clock)
         if spread is not clock:
-            clock = spread
             text = "the clock shows whole seconds: lines of one second are spread over it"
             notes.append(Remark("whole-seconds", text, severity="note"))
-        good = _increasing(clock)
+        # samples whose time is above that of all before
+        filled = np.where(np.isfinite(spread), spread, -np.inf)
+        good = filled > np.maximum.accumulate(np.concatenate([[-np.inf], filled[:-1]]))
         if not good.any():
             continue
         if not good.all():
-            count = int(np.sum(~good))
-            text = f"{count} samples go back in time or have none, and are left out"
+            text = f"{int(np.sum(~good))} samples go back in time or have none, and are left out"
             notes.append(Remark("times-not-increasing", text))
-            recording, clock = recording.rows(good), clock[good]
-        if kind is not None and kind.clock == "start":
-            clock = clock - clock[0]
+            recording = recording.rows(good)
+        clock, same = spread[good], kind is None or kind.clock == "same"
         recordings.append(recording)
-        clocks.append((clock + (kind.delay if kind else 0.0), kind is None or kind.clock == "same"))
+        clocks.append((clock - (0.0 if same else clock[0]) + (kind.delay if kind else 0.0), same))
         notes += recording.notes
     if not clocks:
         raise InputError(
@@ -253,28 +237,17 @@ def _with_times(name: str, members: list[Member], log_map: LogMap) -> Run:
 def _clock(recording: Recording, log_map: LogMap, kind: FileKind | None) -> Floats | None:
     """Time of the samples in s; None where the recording has no time."""
     name = (kind.time_column if kind else "") or log_map.time.column
-    if name:
-        column = _column_in(recording, name)
-        if column:
-            unit = (kind.time_unit if kind else "") or log_map.time.unit
-            return recording.columns[column] * factor(unit, "s", "[time] unit")
-        if name in recording.texts:
-            raise InputError(
-                f"{recording.file}: the time in column {name!r} is not understood: "
-                f"{recording.texts[name][0]!r}; needed are numbers, dates, hh:mm:ss"
-            )
-    if recording.clock is not None:
-        return recording.clock
-    if log_map.time.rate:
+    if name and (column := _column_in(recording, name)):
+        unit = (kind.time_unit if kind else "") or log_map.time.unit
+        return recording.columns[column] * factor(unit, "s", "[time] unit")
+    if name in recording.texts:
+        raise InputError(
+            f"{recording.file}: the time in column {name!r} is not understood: "
+            f"{recording.texts[name][0]!r}; needed are numbers, dates, hh:mm:ss"
+        )
+    if recording.clock is None and log_map.time.rate:
         return np.arange(len(recording)) / log_map.time.rate
-    return None
-
-
-def _increasing(clock: Floats) -> NDArray[np.bool_]:
-    """Samples whose time is above that of all before, (n,)."""
-    filled = np.where(np.isfinite(clock), clock, -np.inf)
-    before = np.maximum.accumulate(np.concatenate([[-np.inf], filled[:-1]]))
-    return np.asarray(filled > before)
+    return recording.clock
 
 
 def alike_structs(recordings: Sequence[Recording]) -> list[int]:
@@ -294,16 +267,12 @@ def _divided(
 
     Recordings without the column take part in every run, where they overlap in time.
     """
+    at = 0
+    recordings = [recording for recording, _ in members]
     if log_map.runs.column:
-        recordings = [recording for recording, _ in members]
-        column = log_map.runs.column
-        at = [i for i, r in enumerate(recordings) if column in r.texts or column in r.columns]
-        if len(at) != 1:
-            raise InputError(f"[runs] column: {_missing(recordings, column)}")
-        own = recordings[at[0]]
-        labels = own.texts.get(column) or [f"{value:g}" for value in own.columns[column]]
+        at, labels = _labels(recordings, log_map.runs.column)
     elif log_map.runs.each_struct:
-        alike = alike_structs([recording for recording, _ in members])
+        alike = alike_structs(recordings)
         if not alike:
             raise InputError(
                 f"[runs] each_struct: {members[0][0].file} has no two structs with the same columns"
@@ -314,24 +283,18 @@ def _divided(
             for i in alike
         ]
     elif log_map.runs.by_time:
-        at = [0]
         clock = _clock(members[0][0], log_map, members[0][1])
-        if clock is None:
-            return [(name, list(members))]
-        steps = np.diff(clock)
+        steps = np.diff(np.zeros(len(recordings[0])) if clock is None else clock)
         ends = (steps < 0.0) & log_map.runs.at_reset | (steps > log_map.runs.at_pause)
-        parts = np.concatenate([[0], np.cumsum(ends)])
-        labels = [f"{name}_{part + 1:02d}" for part in parts]
+        labels = [f"{name}_{part + 1:02d}" for part in np.concatenate([[0], np.cumsum(ends)])]
     else:
         return [(name, list(members))]
     found, every = [], np.asarray(labels)
     for label in dict.fromkeys(labels):
-        keep = every == label
-        part = [
-            (r.rows(keep), kind) if i == at[0] else (r, kind) for i, (r, kind) in enumerate(members)
-        ]
+        part = list(members)
         # the recording that was divided comes first: its start is that of the run
-        found.append((label or "unnamed", [part.pop(at[0]), *part]))
+        whole, kind = part.pop(at)
+        found.append((label, [(whole.rows(every == label), kind), *part]))
     return found
 
 
@@ -349,12 +312,10 @@ def spread_over_seconds(clock: Floats) -> Floats:
     seconds, first, count = np.unique(own, return_index=True, return_counts=True)
     if seconds.size < _FEWEST or np.mean(count[1:-1] > 1) < _SEVERAL:
         return clock
-    usual = float(np.median(count[1:-1]))
     lines = count.astype(np.float64)
-    lines[[0, -1]] = np.maximum(lines[[0, -1]], usual)
-    late = np.zeros(seconds.size)
-    late[0] = lines[0] - count[0]
-    place = np.arange(own.size) - np.repeat(first, count) + np.repeat(late, count)
+    lines[[0, -1]] = np.maximum(lines[[0, -1]], np.median(count[1:-1]))
+    late = np.where(np.arange(seconds.size) == 0, lines - count, 0.0)
+    place = np.arange(own.size) - np.repeat(first - late, count)
     spread = clock.copy()
     spread[known] = own + place / np.repeat(lines, count)
     return spread

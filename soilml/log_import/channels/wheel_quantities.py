@@ -1,20 +1,39 @@
-"""Slip, torque, load and the other quantities of a wheel from its channels and the map."""
+"""Slip, torque, load and the other quantities of a wheel from its channels, the map and its gears;
+errors that all rows share, from the uncertain constants of the map.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.config.measurement_noise import Noise
+from soilml.errors import InputError, did_you_mean
+from soilml.log_import.channels.runs import Run
 from soilml.log_import.mapping.channel_map import GEARED
-from soilml.log_import.mapping.log_map import Vehicle, WheelMap
+from soilml.log_import.mapping.log_map import LogMap, Vehicle, WheelMap
 from soilml.log_import.mapping.uncertain_value import Uncertain
+from soilml.quantities import column
 
-Constants = Callable[[str], float]  # Value of a constant of the map by name, such as "vehicle.mass"
+#: Whether [bias] of a model file can say an offset of a quantity, and a share.
+_FORMS = {
+    "slip": (True, False), "load": (False, True), "torque": (True, True), "sinkage": (True, False),
+    "drawbar_pull": (True, False),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SharedError:
+    """The effect of one uncertain constant on one quantity of the rows: its rms change."""
+
+    constant: str
+    quantity: str
+    rms: float
 
 
 @dataclass(frozen=True)
@@ -26,8 +45,27 @@ class Conversion:
 
     @cached_property
     def constants(self) -> dict[str, Uncertain]:
-        """Every constant that acts on the wheel, by name; see `constants_of`."""
-        return constants_of(self.wheel, self.vehicle)
+        """Every constant of the map that acts on the wheel, by name, with its standard deviation.
+
+        The errors that all rows share are constants too: gains of 1 and offsets of 0.
+        """
+        found: dict[str, Uncertain] = {}
+        if self.wheel.radius is not None:
+            found["radius"] = self.wheel.radius
+        for role, channel in self.wheel.channels.items():
+            offset = channel.bias.constant if channel.value is None else channel.value.std
+            found[f"{role}.gain"] = Uncertain(1.0, channel.bias.share)
+            found[f"{role}.offset"] = Uncertain(0.0, offset)
+            own = ["gear_ratio"] * (role in GEARED)
+            own += ["efficiency"] * (role in ("torque", "motor_current"))
+            own += ["torque_constant", "idle_current"] * (channel.torque_constant is not None)
+            found |= {f"{role}.{key}": getattr(channel, key) for key in own}
+        if self.wheel.leg is not None:
+            found["wheel_leg.sensor_height"] = self.wheel.leg.sensor_height
+        if self.vehicle is not None:
+            for key in ("mass", "wheelbase", "behind_front", "height"):
+                found[f"vehicle.{key}"] = getattr(self.vehicle, key)
+        return found
 
     @cached_property
     def values(self) -> dict[str, float]:
@@ -37,99 +75,117 @@ class Conversion:
     def of(
         self, channels: Mapping[str, Any], constants: Mapping[str, float] | None = None
     ) -> dict[str, Floats]:
-        """Quantities (...) of channels (...); see `wheel_quantities`."""
+        """Quantities (...) of a wheel from its channels (...), in SI units.
+
+        channels: By role, as their sensors see them; `wheel_speed` and `ground_speed` are rates.
+        constants: By name, where they are not those of the map.
+
+        Returns: `rim_speed` and `speed` (m/s), `slip`, `torque`, `load`, `drawbar_pull`, `sinkage`,
+        as far as the channels give them. In reverse, torque and drawbar pull are positive along the
+        travel and the speed is below zero.
+        """
         own = self.values if constants is None else constants
-        found = wheel_quantities(channels, self.wheel, self.vehicle, own)
+
+        def read(role: str) -> Any:
+            return own.get(f"{role}.gain", 1.0) * channels[role] + own.get(f"{role}.offset", 0.0)
+
+        def at_wheel(role: str, motor: Any) -> Any:
+            ratio, efficiency = own[f"{role}.gear_ratio"], own[f"{role}.efficiency"]
+            return direction * through_gearbox(motor, direction, ratio, efficiency)
+
+        found: dict[str, Any] = {}
+        if "rim_speed" in channels:
+            found["rim_speed"] = read("rim_speed")
+        elif "wheel_speed" in channels and "radius" in own:
+            source = "wheel_angle" if "wheel_angle" in self.wheel.channels else "wheel_speed"
+            rate = read("wheel_speed") / own.get(f"{source}.gear_ratio", 1.0)
+            found["rim_speed"] = own["radius"] * rate
+        if "ground_speed" in channels:
+            found["speed"] = read("ground_speed")
+        turning = found.get("rim_speed", channels.get("wheel_speed", found.get("speed", 1.0)))
+        direction = np.where(np.asarray(turning) < 0.0, -1.0, 1.0)
+        if "slip" in channels:
+            found["slip"] = read("slip")
+        elif {"rim_speed", "speed"} <= found.keys():
+            found["slip"] = slip_ratio(direction * found["rim_speed"], direction * found["speed"])
+        if "torque" in channels:
+            found["torque"] = at_wheel("torque", read("torque"))
+        elif "motor_current" in channels:
+            current = read("motor_current") - direction * own["motor_current.idle_current"]
+            motor = own["motor_current.torque_constant"] * current
+            found["torque"] = at_wheel("motor_current", motor)
+        if "load" in channels:
+            found["load"] = read("load")
+        elif self.vehicle is not None:
+            slope = read("slope") if "slope" in channels else 0.0
+            found["load"] = vehicle_load(self.vehicle, self.wheel.axle, slope, own)
+        if "drawbar_pull" in channels:
+            found["drawbar_pull"] = direction * read("drawbar_pull")
+        if "sinkage" in channels:
+            found["sinkage"] = read("sinkage")
+        elif "clearance" in channels:
+            # eq. 10 of Comin and Saaj 2017 with the leg vertical: at midstance
+            hub = read("clearance") - own["wheel_leg.sensor_height"]
+            found["sinkage"] = own["radius"] - hub
+        found |= {role: read(role) for role in ("vibration", "slope") if role in channels}
         return {name: np.asarray(values, dtype=np.float64) for name, values in found.items()}
 
+    def shared_errors(
+        self, means: Mapping[str, Floats]
+    ) -> tuple[dict[str, Noise], list[SharedError]]:
+        """The errors that rows share, by column, and what each constant adds to them.
 
-def constants_of(wheel: WheelMap, vehicle: Vehicle | None) -> dict[str, Uncertain]:
-    """Every constant of the map that acts on a wheel, by name, with its standard deviation.
+        means: Channels of the rows (rows,).
+        Each constant is changed by one standard deviation. The change of a quantity counts as
+        relative or as an offset, whichever describes the rows better, and as [bias] can state it.
+        Constants are taken as independent.
+        """
+        usual = self.of(means)
+        bias: dict[str, Noise] = {}
+        parts = []
+        for name, constant in self.constants.items():
+            if constant.std == 0.0:
+                continue
+            up, down = (
+                self.of(means, self.values | {name: constant.value + sign * constant.std})
+                for sign in (1.0, -1.0)
+            )
+            for key in (key for key in _FORMS if key in usual):
+                change, reading = np.broadcast_arrays((up[key] - down[key]) / 2.0, usual[key])
+                good = np.isfinite(change) & np.isfinite(reading)
+                change, reading = np.atleast_1d(change[good]), np.atleast_1d(reading[good])
+                if not np.any(change):
+                    continue
+                rms, size = (float(np.sqrt(np.mean(x**2))) for x in (change, reading))
+                parts.append(SharedError(name, key, rms))
+                has_offset, has_share = _FORMS[key]
+                gain = float(change @ reading) / (len(reading) * size**2) if size else 0.0
+                by_share, by_offset = (
+                    float(np.sum((change - part) ** 2)) for part in (gain * reading, change.mean())
+                )
+                as_share = by_share < by_offset
+                if len(reading) == 1 and has_offset:
+                    as_share = not name.endswith(("offset", "idle_current"))
+                as_share = has_share and size > 0.0 and (as_share or not has_offset)
+                one = Noise(share=rms / size) if as_share else Noise(constant=rms)
+                bias[column(key)] = _joined(bias.get(column(key), Noise()), one, np.hypot)
+        order = [column(key) for key in _FORMS if column(key) in bias]
+        return {key: bias[key] for key in order}, parts
 
-    The errors that all rows share are constants too: gains of 1 and offsets of 0.
-    """
-    found: dict[str, Uncertain] = {}
-    if wheel.radius is not None:
-        found["radius"] = wheel.radius
-    for role, channel in wheel.channels.items():
-        found[f"{role}.gain"] = Uncertain(1.0, channel.bias.share)
-        found[f"{role}.offset"] = Uncertain(0.0, channel.bias.constant)
-        if channel.value is not None:
-            found[f"{role}.offset"] = Uncertain(0.0, channel.value.std)
-        if role in GEARED:
-            found[f"{role}.gear_ratio"] = channel.gear_ratio
-        if role in ("torque", "motor_current"):
-            found[f"{role}.efficiency"] = channel.efficiency
-        if channel.torque_constant is not None:
-            found[f"{role}.torque_constant"] = channel.torque_constant
-            found[f"{role}.idle_current"] = channel.idle_current
-    if wheel.leg is not None:
-        found["wheel_leg.sensor_height"] = wheel.leg.sensor_height
-    if vehicle is not None:
-        for key in ("mass", "wheelbase", "behind_front", "height"):
-            found[f"vehicle.{key}"] = getattr(vehicle, key)
-    return found
+
+def _joined(one: Noise, other: Noise, how: Any) -> Noise:
+    return Noise(float(how(one.constant, other.constant)), float(how(one.share, other.share)))
 
 
-def wheel_quantities(
-    values: Mapping[str, Any],
-    wheel: WheelMap,
-    vehicle: Vehicle | None,
-    constants: Mapping[str, float],
-) -> dict[str, Any]:
-    """Quantities (...) of a wheel from its channels (...), in SI units.
-
-    values: Channels by role, as their sensors see them; `wheel_speed` and `ground_speed` are rates.
-    constants: Values of `constants_of`.
-
-    Returns: `rim_speed` and `speed` (m/s), `slip`, `torque`, `load`, `drawbar_pull`, `sinkage`, as
-    far as the channels give them. In reverse, torque and drawbar pull are positive along the travel
-    and the speed is below zero.
-    """
-
-    def read(role: str) -> Any:
-        offset = constants.get(f"{role}.offset", 0.0)
-        return constants.get(f"{role}.gain", 1.0) * values[role] + offset
-
-    found: dict[str, Any] = {}
-    if "rim_speed" in values:
-        found["rim_speed"] = read("rim_speed")
-    elif "wheel_speed" in values and "radius" in constants:
-        source = "wheel_angle" if "wheel_angle" in wheel.channels else "wheel_speed"
-        rate = read("wheel_speed") / constants.get(f"{source}.gear_ratio", 1.0)
-        found["rim_speed"] = constants["radius"] * rate
-    if "ground_speed" in values:
-        found["speed"] = read("ground_speed")
-    turning = found.get("rim_speed", values.get("wheel_speed", found.get("speed", 1.0)))
-    direction = np.where(np.asarray(turning) < 0.0, -1.0, 1.0)
-    if "slip" in values:
-        found["slip"] = read("slip")
-    elif {"rim_speed", "speed"} <= found.keys():
-        found["slip"] = slip_ratio(direction * found["rim_speed"], direction * found["speed"])
-    if "torque" in values:
-        found["torque"] = direction * through_gearbox(
-            read("torque"), direction, "torque", constants.__getitem__
-        )
-    elif "motor_current" in values:
-        found["torque"] = direction * torque_from_current(
-            read("motor_current"), direction, constants.__getitem__
-        )
-    if "load" in values:
-        found["load"] = read("load")
-    elif vehicle is not None:
-        slope = read("slope") if "slope" in values else 0.0
-        found["load"] = vehicle_load(vehicle, wheel.axle, slope, constants.__getitem__)
-    if "drawbar_pull" in values:
-        found["drawbar_pull"] = direction * read("drawbar_pull")
-    if "sinkage" in values:
-        found["sinkage"] = read("sinkage")
-    elif "clearance" in values:
-        # eq. 10 of Comin and Saaj 2017 with the leg vertical: at midstance
-        hub = read("clearance") - constants["wheel_leg.sensor_height"]
-        found["sinkage"] = constants["radius"] - hub
-    if "vibration" in values:
-        found["vibration"] = read("vibration")
-    return found
+def largest_errors(
+    found: Sequence[tuple[Mapping[str, Noise], Sequence[SharedError]]],
+) -> tuple[dict[str, Noise], list[SharedError]]:
+    """Shared errors of several wheels as one table [bias], which their rows share: the largest."""
+    bias: dict[str, Noise] = {}
+    for own, _ in found:
+        for key, noise in own.items():
+            bias[key] = _joined(bias.get(key, noise), noise, max)
+    return bias, [part for _, parts in found for part in parts]
 
 
 def slip_ratio(rim: Any, ground: Any) -> Any:
@@ -139,29 +195,20 @@ def slip_ratio(rim: Any, ground: Any) -> Any:
         return np.where(rim >= ground, 1.0 - ground / rim, rim / ground - 1.0)
 
 
-def torque_from_current(current: Any, turning: Any, constant: Constants) -> Any:
-    r"""Torque (...) at the wheel from the current of its motor (...), A.
+def through_gearbox(motor: Any, turning: Any, ratio: float, efficiency: float) -> Any:
+    r"""Torque (...) at the wheel of a torque at the motor (...), N m.
 
-    .. math:: T = \eta G k_t (I - I_0)
+    .. math:: T = \eta G T_m
 
-    while the motor drives. While the wheel drives the motor, the losses of the gearbox come in
-    addition: :math:`T = G k_t (I - I_0) / \eta`. `turning` is the sign of the rotation; the idle
-    current I_0 opposes it.
+    while the motor drives; while the wheel drives the motor, the losses of the gearbox come in
+    addition: :math:`T = G T_m / \eta`. `turning` is the sign of the rotation. From the current of
+    a motor, :math:`T_m = k_t (I - I_0)`, where the idle current I_0 opposes the rotation.
     """
-    motor = constant("motor_current.torque_constant") * (
-        current - np.sign(turning) * constant("motor_current.idle_current")
-    )
-    return through_gearbox(motor, turning, "motor_current", constant)
-
-
-def through_gearbox(motor: Any, turning: Any, role: str, constant: Constants) -> Any:
-    """Torque (...) at the wheel of a torque at the motor (...), N m."""
-    ratio, efficiency = constant(f"{role}.gear_ratio"), constant(f"{role}.efficiency")
     drives = np.asarray(motor) * np.sign(turning) >= 0.0
     return ratio * np.where(drives, efficiency, 1.0 / efficiency) * motor
 
 
-def vehicle_load(vehicle: Vehicle, axle: str, slope: Any, constant: Constants) -> Any:
+def vehicle_load(vehicle: Vehicle, axle: str, slope: Any, constant: Mapping[str, float]) -> Any:
     r"""Load (...) of one wheel at slopes (...), rad, positive uphill, N.
 
     With two axles at a distance L, and the centre of mass d behind the front axle and h above the
@@ -173,12 +220,11 @@ def vehicle_load(vehicle: Vehicle, axle: str, slope: Any, constant: Constants) -
     wheels. Without `wheelbase` or without axles, all wheels carry the same. Static: pull and
     acceleration shift no load.
     """
-    normal = constant("vehicle.mass") * vehicle.gravity * np.cos(slope)
-    length = constant("vehicle.wheelbase")
+    weight, length = constant["vehicle.mass"] * vehicle.gravity, constant["vehicle.wheelbase"]
+    normal = weight * np.cos(slope)
     if axle not in ("front", "rear") or not length > 0.0:
         return normal / vehicle.wheels
-    weight = constant("vehicle.mass") * vehicle.gravity
-    behind, height = constant("vehicle.behind_front"), constant("vehicle.height")
+    behind, height = constant["vehicle.behind_front"], constant["vehicle.height"]
     front = weight * ((length - behind) * np.cos(slope) - height * np.sin(slope)) / length
     return (front if axle == "front" else normal - front) / max(1.0, vehicle.wheels / 2.0)
 
@@ -199,3 +245,51 @@ def slope_of(columns: Sequence[Floats]) -> Floats:
     with np.errstate(invalid="ignore", divide="ignore"):
         rise = 2.0 * (x * z - w * y) / (x**2 + y**2 + z**2 + w**2)
     return np.arcsin(np.clip(rise, -1.0, 1.0))
+
+
+def gear_of(wheel: WheelMap, run: Run) -> str:
+    """The gear of a wheel in a run; "" where the map states none.
+
+    Raises `InputError` where neither the name of the run nor that of its file has it.
+    """
+    if wheel.gear_pattern is None:
+        return wheel.gear
+    for text in (run.name, run.recordings[0].file.name):
+        if match := wheel.gear_pattern.search(text):
+            return match[match.re.groups]
+    raise InputError(
+        f"[wheel] gear_from {wheel.gear_pattern.pattern!r} finds nothing in the name of the run "
+        f"{run.name!r}, nor in {run.recordings[0].file.name!r}"
+    )
+
+
+def wheels_by_gear(
+    log_map: LogMap, wheel: WheelMap, runs: Sequence[Run]
+) -> list[tuple[WheelMap, list[int]]]:
+    """The wheel with each gear that it had, with the gear's radius, and the indices of its runs.
+
+    One wheel with all runs where the map has no [gears]. Names of gears are compared whatever the
+    case of their letters.
+
+    Raises `InputError` where a run has a gear that [gears] lacks, and no other radius is given; and
+    as `gear_of` does.
+    """
+    if not log_map.gears or wheel.gear_pattern is None:
+        return [(wheel, list(range(len(runs))))]
+    names = {name.casefold(): name for name in log_map.gears}
+    found: dict[str, list[int]] = {}
+    for i, run in enumerate(runs):
+        gear = gear_of(wheel, run)
+        known = names.get(gear.casefold())
+        if known is None and wheel.radius is None:
+            raise InputError(
+                f"{log_map.source}: run {run.name!r} has the gear {gear!r}, and [gears] does not; "
+                f"{did_you_mean(gear, names.values())}there are {', '.join(log_map.gears)}; add "
+                f"[gears.{gear}] with its radius, or correct gear_from"
+            )
+        found.setdefault(known or gear, []).append(i)
+    return [
+        (replace(wheel, gear=gear, gear_pattern=None,
+                 radius=log_map.gears.get(gear, wheel.radius)), own)
+        for gear, own in found.items()
+    ]  # fmt: skip

@@ -57,8 +57,9 @@ def rate_hints(
         return
     ratio = ground[good] / rim[good]
     travel = "position" if "position" in channels else "ground_speed"
-    if why := one_sensor(wheel, rotation, travel, rim[good], ground[good], effort[good]):
-        yield "one-sensor", why, (rotation, travel)
+    if why := _one_sensor(wheel, rotation, travel, rim[good], ratio, effort[good]):
+        text = f"{why}; needed is a travel from another sensor, or [slip]"
+        yield "one-sensor", text, (rotation, travel)
         return
     if float(np.median(ratio)) < -0.02:
         text = (
@@ -69,18 +70,26 @@ def rate_hints(
         ratio = np.abs(ratio)
     middle, fastest = float(np.median(ratio)), float(np.max(ratio))
     if 0.0 < fastest < 0.3:
+        excess = f"{1.0 / fastest:.3g}"
+        cause = _other_units(wheel, (rotation, travel), fastest, _FASTEST) or (
+            f"probably it was measured before a gearbox of up to {excess} to 1 (write gear_ratio "
+            f"in [{rotation}]), or its unit is wrong"
+        )
+        if wheel.radius is not None and wheel.radius.value > 2.0:
+            cause = "probably the radius is in mm"
         text = (
-            f"slip is {1.0 - fastest:.4g} or more in all windows: the rim would be "
-            f"{1.0 / fastest:.3g} times as fast as the travel; "
-            f"{_too_fast(wheel, rotation, travel, 1.0 / fastest)}"
+            f"slip is {1.0 - fastest:.4g} or more in all windows: the rim would be {excess} times "
+            f"as fast as the travel; {cause}"
         )
         yield "rotation-too-fast", text, (rotation,)
     elif middle > 3.0:
-        text = (
-            f"travel is {middle:.3g} times as fast as the rim in the middle of the windows; "
-            f"{_too_slow(wheel, rotation, travel, middle)}"
-        )
-        yield "travel-too-fast", text, (travel, rotation)
+        gear = channels[rotation].gear_ratio.value
+        cause = _other_units(wheel, (rotation, travel), middle, _MIDDLE)
+        if not cause and gear > 1.0 and middle > 0.4 * gear:
+            cause = f"probably [{rotation}] was measured after the gearbox; remove gear_ratio"
+        cause = cause or f"probably the unit of [{travel}] or of [{rotation}] is wrong"
+        shown = f"travel is {middle:.3g} times as fast as the rim in the middle of the windows"
+        yield "travel-too-fast", f"{shown}; {cause}", (travel, rotation)
     elif 0.3 <= fastest < 0.55 and ratio.size > 2 and np.ptp(ratio) > 0.02:
         radius = wheel.radius.value if wheel.radius else math.nan
         text = (
@@ -90,35 +99,30 @@ def rate_hints(
         yield "radius-as-diameter", text, ("radius",)
 
 
-def one_sensor(
-    wheel: WheelMap, rotation: str, travel: str, rim: Floats, ground: Floats, effort: Floats
+def _one_sensor(
+    wheel: WheelMap, rotation: str, travel: str, rim: Floats, ratio: Floats, effort: Floats
 ) -> str:
     """Why rotation and travel are one measurement, from which no slip follows; "" where two are.
 
-    rim, ground: Means of windows or samples (n,), m/s. The travel of an odometry of the wheels is r
+    rim, ratio: Rim speed and travel over it (n,). The travel of an odometry of the wheels is r
     omega within its resolution, also where the speed or the `effort` changes.
     """
     ours, theirs = wheel.channels[rotation].columns, wheel.channels[travel].columns
-    needed = "needed is a travel from another sensor, or [slip]"
     if {*ours} & {*theirs}:
-        return (
-            f"[{rotation}] and [{travel}] are both of the column {theirs[0]!r}: slip is a constant "
-            f"by construction; {needed}"
-        )
+        both = f"[{rotation}] and [{travel}] are both of the column {theirs[0]!r}"
+        return f"{both}: slip is a constant by construction"
     moves = np.abs(rim) > _MOVES * float(np.max(np.abs(rim), initial=0.0))
     if not ours or not theirs or moves.sum() < _FEWEST:
         return ""
-    ratio = ground[moves] / rim[moves]
+    rim, ratio = np.abs(rim[moves]), ratio[moves]
     middle = float(np.median(ratio))
-    alike = abs(middle - 1.0) < _ODOMETRY and float(np.std(ratio)) < _RESOLUTION
-    changes = float(np.std(rim[moves])) > 10.0 * _RESOLUTION * float(np.median(np.abs(rim[moves])))
-    changes |= slip_without_cause(ratio, effort[moves])
-    if not (alike and (changes or float(np.ptp(ratio)) == 0.0)):
+    changes = float(np.std(rim)) > 10.0 * _RESOLUTION * float(np.median(rim))
+    changes |= slip_without_cause(ratio, effort[moves]) or float(np.ptp(ratio)) == 0.0
+    if abs(middle - 1.0) >= _ODOMETRY or float(np.std(ratio)) >= _RESOLUTION or not changes:
         return ""
     return (
         f"the travel is {middle:.4g} times the rim speed in all {int(moves.sum())} windows: "
-        f"[{travel}] seems to be computed from the rotation, so that slip is 0 by construction; "
-        f"{needed}"
+        f"[{travel}] seems to be computed from the rotation, so that slip is 0 by construction"
     )
 
 
@@ -137,21 +141,3 @@ def _other_units(
             if plausible[0] < ratio * larger**power < plausible[1]:
                 found.append(f"[{role}] is in {meant}, and was read as {read}")
     return f"probably {', or '.join(found)}" if found else ""
-
-
-def _too_fast(wheel: WheelMap, rotation: str, travel: str, excess: float) -> str:
-    if wheel.radius is not None and wheel.radius.value > 2.0:
-        return "probably the radius is in mm"
-    return _other_units(wheel, (rotation, travel), 1.0 / excess, _FASTEST) or (
-        f"probably it was measured before a gearbox of up to {excess:.3g} to 1 (write gear_ratio "
-        f"in [{rotation}]), or its unit is wrong"
-    )
-
-
-def _too_slow(wheel: WheelMap, rotation: str, travel: str, excess: float) -> str:
-    ratio = wheel.channels[rotation].gear_ratio.value
-    if likely := _other_units(wheel, (rotation, travel), excess, _MIDDLE):
-        return likely
-    if ratio > 1.0 and excess > 0.4 * ratio:
-        return f"probably [{rotation}] was measured after the gearbox; remove gear_ratio"
-    return f"probably the unit of [{travel}] or of [{rotation}] is wrong"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from soilml.log_import.guesses.columns import CLEAR, Candidate, words_of
+from soilml.log_import.guesses.columns import CLEAR, Candidate, says
 from soilml.log_import.guesses.constants import StatedConstants, number_in_names
 from soilml.log_import.guesses.roles import Assignment
 from soilml.log_import.mapping.channel_map import ROLES
@@ -41,15 +41,14 @@ class AbsentChannels:
         labels: The number of wheels that a column of the log distinguishes.
         """
         common = self.stated.common
-        said = None if {"load", "mass"} <= common.keys() else self._said("load")
-        if said := said or self._said_by_names("load"):
+        both = {"load", "mass"} <= common.keys()
+        if said := self._said("load", logs=not both):
             return said
         count, why = max(1, len(self.found.wheels), labels), ""
         if count == 1:
-            why = Marked("CHANGE: how many wheels carry this mass")
-            if "wheels" in common:
-                number, line = common["wheels"]
-                count, why = int(number), f"stated in the log: {line[:60]}"
+            number, line = common.get("wheels", ("1", ""))
+            why = f"stated in the log: {line[:60]}" if line else ""
+            count, why = int(number), why or Marked("CHANGE: how many wheels carry this mass")
         table = WrittenTable(before=["# No column is a vertical load: it follows from the mass."])
         if "mass" in common:
             table.path = "vehicle"
@@ -65,43 +64,37 @@ class AbsentChannels:
         ]
         return table
 
-    def _said(self, role: str, unit: str = "") -> WrittenTable | None:
-        """The table of a role that the lines before the headers state, of all logs or of each."""
+    def _said(self, role: str, unit: str = "", logs: bool = True) -> WrittenTable | None:
+        """The table of a role that the lines before the headers state, of all logs or of each, or
+        whose number stands in the names of all runs.
+        """
         std, usual = _STATED[role]
-        if role in self.stated.common:
+        if logs and role in self.stated.common:
             value, line = self.stated.common[role]
             why = f"stated in the log: {line[:60]}"
             return WrittenTable(role, {"value": f"{value} +- {std}"}, {"value": why})
-        if role not in self.stated.of_each:
-            return None
-        pattern, own, values = self.stated.of_each[role]
-        why = f"the logs state {', '.join(values[:4])}"
-        return WrittenTable(role, {"head": pattern, "unit": own or unit or usual}, {"head": why})
-
-    def _said_by_names(self, role: str) -> WrittenTable | None:
-        """The table of a role whose number stands in the names of all runs."""
-        in_name = number_in_names(role, self.run_names)
-        if in_name is None:
+        if logs and role in self.stated.of_each:
+            pattern, own, values = self.stated.of_each[role]
+            why = f"the logs state {', '.join(values[:4])}"
+            return WrittenTable(
+                role, {"head": pattern, "unit": own or unit or usual}, {"head": why}
+            )
+        if (in_name := number_in_names(role, self.run_names)) is None:
             return None
         pattern, unit, numbers = in_name
         why = f"the names say {', '.join(f'{n:g}' for n in numbers[:4])}"
         return WrittenTable(role, {"file_name": pattern, "unit": unit}, {"file_name": why})
-
-    def _set_slip(self) -> WrittenTable | None:
-        """A slip that was set, as the heads or the names of the logs say."""
-        values = self.stated.of_each["slip"][2] if "slip" in self.stated.of_each else []
-        large = any(float(value.split()[0]) > 1.0 for value in values)
-        table = self._said("slip", "%" if large else "1")
-        if table is not None and "slip" not in self.stated.common:
-            table.put("noise", 0.01, Marked("CHANGE: how far the slip may be from what was set"))
-        return table or self._said_by_names("slip")
 
     def table(self, role: str) -> list[WrittenTable]:
         """What stands for a role other than the load: what is needed, or the runner-up."""
         roles, others = self.found.roles(), self.found.others.get(role, [])
         said: WrittenTable | None = None
         if role == "slip" and not {"position", "ground_speed"} & roles:
-            said = self._set_slip()
+            values = self.stated.of_each["slip"][2] if "slip" in self.stated.of_each else []
+            said = self._said(role, "%" if any(float(v.split()[0]) > 1.0 for v in values) else "1")
+            if said is not None and "head" in said.keys:
+                why = Marked("CHANGE: how far the slip may be from what was set")
+                said.put("noise", 0.01, why)
         elif role == "ground_speed" and not {"position", "slip"} & roles:
             said = self._said(role)
         if said is not None:
@@ -112,7 +105,7 @@ class AbsentChannels:
             needed = Marked(f"# NEEDED{what}. One of these:")
             lines = [] if instead & roles else [needed, *options]
             if lines and role == "wheel_speed":
-                commanded = [c.address for c in self.columns if "slip" in words_of(c.name)]
+                commanded = [c.address for c in self.columns if says(c.name, ("slip",))]
                 lines += [f"# [slip]  # column = {toml_value(name)}" for name in commanded]
         elif role in ("drawbar_pull", "sinkage") and not others:
             lines = self._perhaps(role)
@@ -127,13 +120,13 @@ class AbsentChannels:
         used = {c.address for own in groups for c in own.values()}
         used |= {c.address for own in self.found.parts.values() for c in own}
         names = [
-            c.address for c in self.columns
+            toml_value(c.address) for c in self.columns
             if c.kind == ROLES[role][0] and c.address not in used and not c.about.constant
             and not (role == "sinkage" and c.about.travel > 0.6)
             and all(score < CLEAR for other, score in c.scores.items() if other != role)
         ]  # fmt: skip
         if not names:
             return []
-        shown = ", ".join(map(toml_value, names[:4]))
+        shown = ", ".join(names[:4])
         line = f"# [{role}]  # CHANGE: perhaps one of {shown} is {ROLES[role][1]}"
-        return [Marked(line), f"# column = {toml_value(names[0])}"]
+        return [Marked(line), f"# column = {names[0]}"]

@@ -8,19 +8,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.guesses.columns import CALIBRATED, Candidate, name_scores, words_of
-from soilml.log_import.guesses.constants import stated_radius
+from soilml.log_import.guesses.columns import CALIBRATED, Candidate, name_scores, says, words_of
+from soilml.log_import.guesses.constants import Stated, stated_radius
 from soilml.log_import.guesses.draft import Draft, inputs_of
 from soilml.log_import.guesses.evidence import BY_NAME, LEAST_PERCENT, MOST_FRACTION
 from soilml.log_import.guesses.roles import Assignment
-from soilml.log_import.guesses.signs_and_tares import (
-    far_sinkage,
-    lifted,
-    sign_of_pull,
-    sign_of_slip,
-    signs,
-    tares,
-)
+from soilml.log_import.guesses.signs_and_tares import far_sinkage, lifted, signs, tares
 from soilml.log_import.mapping.channel_map import GEARED, ROLES
 from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import dimension, is_raw_signal
@@ -32,27 +25,39 @@ _AS_FORCE = {"g": "gf", "gram": "gf", "grams": "gf", "lb": "lbf", "pound": "lbf"
 _FAR_IN_M = 4.0  # A height of so many m is rather one in mm
 #: Words that say that a column counts the pulses of an encoder.
 _COUNTS = {"count", "counts", "tick", "ticks", "enc", "encoder", "qc", "pulses"}
+#: Units by the size of the values, where none is stated: the least size, and the unit.
+_BY_SIZE: dict[str, tuple[tuple[float, str], ...]] = {
+    "ground_speed": ((8.0, "mm/s"), (3.0, "cm/s"), (0.0, "m/s")),
+    "rim_speed": ((8.0, "mm/s"), (3.0, "cm/s"), (0.0, "m/s")),
+    "position": ((25.0, "mm"), (0.0, "m")),
+    "sinkage": ((1.0, "mm"), (0.0, "m")),
+    "torque": ((300.0, "mN m"), (0.0, "N m")),
+    "motor_current": ((60.0, "mA"), (0.0, "A")),
+    "slope": ((1.2, "deg"), (0.0, "rad")),
+    "slip": ((LEAST_PERCENT, "%"), (0.0, "1")),
+    "load": ((0.0, "N"),),
+    "drawbar_pull": ((0.0, "N"),),
+    "wheel_speed": ((0.0, "rad/s"),),
+}
+_CELLS = "CHANGE: cells that {} are added; leave out others"
 #: What several columns of a channel are.
 _SEVERAL = {
-    "load": Marked("CHANGE: cells that carry the wheel together are added; leave out others"),
-    "drawbar_pull": Marked("CHANGE: cells that pull together are added; leave out others"),
+    "load": Marked(_CELLS.format("carry the wheel together")),
+    "drawbar_pull": Marked(_CELLS.format("pull together")),
     "sinkage": "the mean of them",
     "slope": Marked(
         "CHANGE: accelerations forward, to the left and up; or a quaternion x, y, z, w"
     ),
 }
-#: Words of columns that are errors of others.
-_ERRORS = {
-    "std", "sd", "sigma", "err", "error", "stderr", "se", "sem", "uncertainty", "dev", "deviation",
-    "stdev", "stddev", "fehler", "unsicherheit", "streuung", "abweichung", "cv", "rms",
-    "incertezza", "incertidumbre", "desv", "desviacion", "desviación", "ecart", "écart", "u",
-    "标准差", "误差",
-}  # fmt: skip
+#: Words of columns that are errors of others, and those that may stand beside them.
+_ERRORS = {*words_of(
+    "std sd sigma err error stderr se sem uncertainty dev deviation stdev stddev fehler"
+    " unsicherheit streuung abweichung cv rms incertezza incertidumbre desv desviacion"
+    " desviación ecart écart u 标准差 误差"
+)}  # fmt: skip
+_BESIDE = {*words_of("of the type standard estandar estándar mean avg average rel")}
 #: Words of a slip that is (r omega - v) / v: ISO 8855, and `GetLongitudinalSlip` of Chrono.
 _OF_TYRES = {"kappa", "long", "longitudinal"}
-_FILLERS = {
-    "of", "the", "type", "standard", "estandar", "estándar", "mean", "avg", "average", "rel",
-}  # fmt: skip
 
 
 def guess_unit(role: str, column: Candidate, moving: float) -> tuple[str, str]:
@@ -60,40 +65,24 @@ def guess_unit(role: str, column: Candidate, moving: float) -> tuple[str, str]:
 
     `moving` is the 90th percentile of the values without sign.
     """
+    if column.unit and column.kind == "kg":
+        force = _AS_FORCE.get(column.unit.lower(), "kgf")
+        return force, f"the log says {column.unit}; as a force that is {force}"
     if column.unit and column.kind is not None:
-        if column.kind == "kg":
-            force = _AS_FORCE.get(column.unit.lower(), "kgf")
-            return force, f"the log says {column.unit}; as a force that is {force}"
         return column.unit, ""
-    words = words_of(column.name)
-    if role in ("wheel_angle", "wheel_speed") and _COUNTS & {*words}:
+    if role in ("wheel_angle", "wheel_speed") and says(column.name, _COUNTS):
         return "count" if role == "wheel_angle" else "count/s", BY_NAME
-    if role == "wheel_angle":
-        if column.about.wraps_at:
-            if abs(column.about.wraps_at - 2.0 * math.pi) < 0.01:
-                return "rad", "it starts again at 2 pi"
-            if column.about.wraps_at == 360.0:
-                return "deg", "it starts again at 360"
-            return "count", f"it starts again at {column.about.wraps_at:g}"
-        return ("deg", "its values are large") if moving > 60.0 else ("rad", "its values are small")
-    large = {
-        "ground_speed": ((8.0, "mm/s"), (3.0, "cm/s"), (0.0, "m/s")),
-        "rim_speed": ((8.0, "mm/s"), (3.0, "cm/s"), (0.0, "m/s")),
-        "position": ((25.0, "mm"), (0.0, "m")),
-        "sinkage": ((1.0, "mm"), (0.0, "m")),
-        "torque": ((300.0, "mN m"), (0.0, "N m")),
-        "motor_current": ((60.0, "mA"), (0.0, "A")),
-        "slope": ((1.2, "deg"), (0.0, "rad")),
-        "slip": ((LEAST_PERCENT, "%"), (0.0, "1")),
-        "load": ((0.0, "N"),),
-        "drawbar_pull": ((0.0, "N"),),
-        "wheel_speed": ((0.0, "rad/s"),),
-    }[role]
-    unit = next(unit for least, unit in large if moving >= least)
-    if "rpm" in words and role == "wheel_speed":
+    if role == "wheel_speed" and says(column.name, ("rpm",)):
         return "rpm", BY_NAME
-    why = "not stated; by the size of the values" if len(large) > 1 else "not stated"
-    return unit, why
+    if role == "wheel_angle":
+        range_ = column.about.wraps_at
+        if not range_:
+            return ("deg", "its values are large") if moving > 60 else ("rad", "they are small")
+        unit = {360.0: "deg", 2.0 * math.pi: "rad"}.get(range_, "count")
+        return unit, f"it starts again at {range_:g}"
+    units = _BY_SIZE[role]
+    why = "not stated; by the size of the values" if len(units) > 1 else "not stated"
+    return next(unit for least, unit in units if moving >= least), why
 
 
 def guess_rotation_unit(rotation: float, travel: float, radius: float) -> tuple[str, str]:
@@ -113,46 +102,36 @@ def guess_rotation_unit(rotation: float, travel: float, radius: float) -> tuple[
 
 
 def draft_of(
-    role: str,
-    column: Candidate,
-    run: Run,
-    stated: dict[str, tuple[str, str]],
-    more: Sequence[Candidate],
+    role: str, column: Candidate, run: Run, stated: Stated, more: Sequence[Candidate]
 ) -> Draft:
     """The table of a channel; `more` are its other columns: y and z of a place, further cells."""
     draft = Draft(column=column)
-    draft.put(
-        "column", [c.address for c in (column, *more)] if more else column.address,
-        _SEVERAL.get(role, "") if more else "",
-    )  # fmt: skip
-    _, values = run.find(column.address)
-    known = values[np.isfinite(values)]
-    moving = float(np.percentile(np.abs(known), 90)) if known.size else 0.0
-    if role in ("position", "wheel_angle", "sinkage") and known.size:
-        moving = max(float(np.nanmax(v) - np.nanmin(v)) for v in
-                     (run.find(c.address)[1] for c in (column, *more)))  # fmt: skip
+    all_ = [c.address for c in (column, *more)]
+    draft.put("column", all_ if more else all_[0], _SEVERAL.get(role, "") if more else "")
+    columns = [values[np.isfinite(values)] for values in (run.find(c)[1] for c in all_)]
+    moving = float(np.percentile(np.abs(columns[0]), 90)) if columns[0].size else 0.0
+    if role in ("position", "wheel_angle", "sinkage") and columns[0].size:
+        moving = max(float(np.ptp(values)) for values in columns if values.size)
         if role == "sinkage":  # no wheel sinks in by metres, however little that changes
-            moving = max(moving, float(np.nanmedian(np.abs(known))) / _FAR_IN_M)
+            moving = max(moving, float(np.median(np.abs(columns[0]))) / _FAR_IN_M)
     if role == "slope" and more:
         return draft  # an angle, whatever the unit of accelerations
     unit, why = guess_unit(role, column, moving)
-    if role == "position" and dimension(unit) == "count":
+    kind = dimension(unit)
+    if role == "position" and kind == "count":
         draft.put("scale", "1 mm", Marked(f"CHANGE: travel for one count ({unit})"))
     elif is_raw_signal(unit) and role in CALIBRATED:
         why = f"CHANGE: what 1 {unit} is, from the calibration of the sensor"
         draft.put("scale", f"1 {ROLES[role][0]}", Marked(why))
-    elif dimension(unit) == "1" and role in ("torque", "motor_current"):
+    elif kind == "1" and role in ("torque", "motor_current"):
         why = Marked("CHANGE: what 1 % is, a hundredth of the rated value of the motor")
         draft.put("scale", f"0.01 {ROLES[role][0]}", why)
-    elif dimension(unit) in ("count", "count/s"):
-        draft.put("unit", unit, why)
-        if "counts_per_turn" in stated:
-            draft.put("counts_per_turn", float(stated["counts_per_turn"][0]), "stated in the log")
-        else:
-            why = Marked("CHANGE: counts for one turn of the encoder")
-            draft.put("counts_per_turn", 1.0, why)
     else:
         draft.put("unit", unit, why)
+    if "unit" in draft.keys and kind in ("count", "count/s"):
+        turn, why = stated.get("counts_per_turn", ("1", "")), "stated in the log"
+        asked = Marked("CHANGE: counts for one turn of the encoder")
+        draft.put("counts_per_turn", float(turn[0]), why if turn[1] else asked)
     if role == "slope" and column.address.endswith("orientation.pitch"):
         why = "of a quaternion (REP 103): there the nose is down where it is positive"
         draft.put("reverse", True, why)
@@ -162,22 +141,20 @@ def draft_of(
             "cent, write unit = '%' and remove this line"
         )
         draft.put("definition", "(r omega - v)/v", why)
-    elif role == "slip" and _OF_TYRES & {*words_of(column.name)}:
+    elif role == "slip" and says(column.name, _OF_TYRES):
         why = "as of tyres, and of Chrono's rigs; remove this line where it is 1 - v/(r omega)"
         draft.put("definition", "(r omega - v)/v", why)
     if role == "wheel_angle" and column.about.wraps_at:
         draft.put("wraps_at", column.about.wraps_at, "it starts again there")
-    if role in GEARED and (role != "torque" or {"motor", "mot"} & {*words_of(column.name)}):
+    if role in GEARED and (role != "torque" or says(column.name, ("motor", "mot"))):
         _put_gear_ratio(draft, role, column, stated.get("gear_ratio"))
     if role == "motor_current":
-        if said := stated.get("torque_constant"):
-            draft.put("torque_constant", f"{said[0]} +- 5 %", f"stated: {said[1]}")
-        else:
-            why = Marked("CHANGE: from the data sheet of the motor")
-            draft.put("torque_constant", "1.0 N m/A +- 5 %", why)
-        efficiency = stated.get("efficiency", ("0.7", ""))[0]
-        why = "of the gearbox" if "efficiency" in stated else Marked("CHANGE: of the gearbox")
-        draft.put("efficiency", f"{efficiency} +- 0.05", why)
+        said, line = stated.get("torque_constant", ("1.0 N m/A", ""))
+        why = f"stated: {line}" if line else Marked("CHANGE: from the data sheet of the motor")
+        draft.put("torque_constant", f"{said} +- 5 %", why)
+        said, line = stated.get("efficiency", ("0.7", ""))
+        why = "of the gearbox" if line else Marked("CHANGE: of the gearbox")
+        draft.put("efficiency", f"{said} +- 0.05", why)
         draft.put("idle_current", "0 A +- 0.02 A", "what the lifted wheel takes at this speed")
     return draft
 
@@ -197,68 +174,46 @@ def _put_gear_ratio(
     draft.put("gear_ratio", 1.0, why)
 
 
-def rotation_unit(drafts: dict[str, Draft], stated: dict[str, tuple[str, str]]) -> None:
-    """Find the unit of a rotation rate that states none beside the travel speed."""
-    rotation, ground = drafts.get("wheel_speed"), drafts.get("ground_speed")
-    if rotation is None or rotation.column is None or rotation.keys["unit"] != "rad/s":
-        return
-    if rotation.column.unit or ground is None or ground.column is None:
-        return
-    factor = {"mm/s": 1e-3, "cm/s": 1e-2}.get(ground.keys["unit"], 1.0)
-    radius = stated_radius(stated)
-    unit, why = guess_rotation_unit(
-        rotation.column.about.size, factor * ground.column.about.size, radius
-    )
-    rotation.put("unit", unit, why)
-
-
 def draft_channels(
-    chosen: dict[str, Candidate],
-    run: Run,
-    stated: dict[str, tuple[str, str]],
-    parts: Mapping[str, Sequence[Candidate]] | None = None,
+    chosen: dict[str, Candidate], run: Run, stated: Stated, parts: Mapping[str, Sequence[Candidate]]
 ) -> dict[str, Draft]:
     """Tables of the channels of one wheel, with units, signs and tares as the samples show them.
 
     `parts` are the further columns of a role: y and z, where the chosen place is x.
     """
-    drafts = {
-        role: draft_of(role, column, run, stated, (parts or {}).get(role, ()))
-        for role, column in chosen.items()
-    }
-    rotation_unit(drafts, stated)
-    inputs = inputs_of(drafts, run)
-    if inputs is not None:
+    drafts = {r: draft_of(r, column, run, stated, parts.get(r, ())) for r, column in chosen.items()}
+    rotation, ground = drafts.get("wheel_speed"), drafts.get("ground_speed")
+    radius = stated_radius(stated)
+    if rotation and ground and rotation.keys.get("unit") == "rad/s" and not rotation.column.unit:
+        size = {"mm/s": 1e-3, "cm/s": 1e-2}.get(ground.keys["unit"], 1.0) * ground.column.about.size
+        rotation.put("unit", *guess_rotation_unit(rotation.column.about.size, size, radius))
+    if (inputs := inputs_of(drafts, run)) is not None:
         signs(drafts, inputs)
-        sign_of_slip(drafts, inputs)
-        sign_of_pull(drafts, inputs)
         tares(drafts, inputs)
-        far_sinkage(drafts, inputs, stated_radius(stated))
+        far_sinkage(drafts, inputs, radius)
         lifted(drafts, inputs)
     return drafts
 
 
 def is_error(candidate: Candidate) -> bool:
     """Whether a column is the error of another one, by its name: `T_std`, `err Fz`."""
-    words = words_of(candidate.name)
-    return "±" in candidate.name or (len(words) > 1 and bool(_ERRORS & {*words}))
+    several = len(words_of(candidate.name)) > 1
+    return "±" in candidate.name or (several and says(candidate.name, _ERRORS))
 
 
 def add_errors(drafts: dict[str, Draft], found: Assignment, errors: Sequence[Candidate]) -> None:
     """Add the columns of standard errors to the channels whose names they share."""
     for role, column in found.shared.items():
-        own = _plain(column.name)
         for error in errors:
-            same = _plain(error.name) == own
-            if not same and role not in name_scores(" ".join(_plain(error.name))):
-                continue
-            draft = drafts[role]
-            why = "CHANGE where it is the scatter of samples or repeats: of the mean, it is less"
-            draft.put("std", error.address, Marked(why))
-            if error.unit and error.unit != column.unit:
-                draft.put("std_unit", error.unit)
-            break
-
-
-def _plain(name: str) -> list[str]:
-    return [word for word in words_of(name) if word not in _ERRORS | _FILLERS]
+            own, plain = (
+                [word for word in words_of(name) if word not in _ERRORS | _BESIDE]
+                for name in (column.name, error.name)
+            )
+            if own == plain or role in name_scores(" ".join(plain)):
+                why = (
+                    "CHANGE where it is the scatter of samples or repeats: of the mean, it is less"
+                )
+                drafts[role].put("std", error.address, Marked(why))
+                if error.unit and error.unit != column.unit:
+                    drafts[role].put("std_unit", error.unit)
+                break

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -12,20 +13,18 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.guesses.behaviour import Behaviour, behaviour, looks_like_time, rises
+from soilml.log_import.guesses.behaviour import Behaviour, behaviour, clock_score
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import dimension, is_raw_signal, spelling, unit_in_name
 from soilml.optional_imports import tomllib
 
 #: Words that say which wheel a column belongs to.
+_PLACES = ("left", "right", "front", "rear", "middle", "mid", "centre", "center", "back")
 WHEEL_WORDS = (
     *("fl", "fr", "rl", "rr", "ml", "mr", "cl", "cr", "bl", "br"),
-    *("lf", "rf", "lr", "lm", "rm", "lb", "rb"),
-    *("left", "right", "front", "rear", "middle", "mid", "centre", "center", "back"),
-    *"12345678",
-)
-_PLACES = ("left", "right", "front", "rear", "middle", "mid", "centre", "center", "back")
+    *("lf", "rf", "lr", "lm", "rm", "lb", "rb"), *_PLACES, *"12345678",
+)  # fmt: skip
 #: Words of topics and columns that say nothing of the quantity.
 _FILLERS = ("state", "states", "data", "status", "sensor", "feedback", "measured", "actual", "raw",
             "mean", "avg", "average")  # fmt: skip
@@ -79,6 +78,11 @@ _MOST_TEXTS = 12  # Most columns of text that are listed
 def words_of(name: str) -> list[str]:
     """The words of a column's name in small letters: `WheelSpeed_FL` -> wheel, speed, fl."""
     return [word.lower() for word in _WORD.findall(_CAMEL.sub(" ", name))]
+
+
+def says(name: str, known: Collection[str]) -> bool:
+    """Whether a name has one of these words."""
+    return not {*known}.isdisjoint(words_of(name))
 
 
 def is_size(name: str) -> bool:
@@ -181,38 +185,26 @@ class Candidate:
 
 
 def candidates_of(recordings: Sequence[Recording], steady: bool = False) -> list[Candidate]:
-    """All numeric columns, with their scores; in a table of `steady` runs they may be constant."""
-    counts: dict[str, int] = {}
-    for recording in recordings:
-        for name in recording.columns:
-            counts[name] = counts.get(name, 0) + 1
-    return _of_sides(
-        [
-            _candidate(recording, name, counts[name] > 1, steady)
-            for recording in recordings
-            for name in recording.columns
-        ]
-    )
+    """All numeric columns, with their scores; in a table of `steady` runs they may be constant.
 
-
-def _of_sides(columns: list[Candidate]) -> list[Candidate]:
-    """The columns, of which speeds of a left and a right side, or with numbers, are of wheels.
-
-    A vehicle has one speed of travel: `velL` and `velR`, `velocity0` and `velocity1` turn.
+    A vehicle has one speed of travel: of a left and a right side, or with numbers, as `velL` and
+    `velR`, `velocity0` and `velocity1`, they are those of wheels.
     """
-    frames: dict[str, list[Candidate]] = {}
-    for c in columns:
+    counts = Counter(name for recording in recordings for name in recording.columns)
+    columns = [
+        _candidate(recording, name, counts[name] > 1, steady)
+        for recording in recordings for name in recording.columns
+    ]  # fmt: skip
+    frames: dict[str, list[int]] = {}
+    for i, c in enumerate(columns):
         best = max(c.scores, key=lambda role: c.scores[role], default="")
         if best == "ground_speed" and (match := _SIDE.search(c.address)):
-            frames.setdefault(c.address[: match.start()], []).append(c)
-    of_wheels = {c.address for own in frames.values() if len(own) > 1 for c in own}
-    found = []
-    for c in columns:
-        if c.address in of_wheels:
-            role = "rim_speed" if c.kind == "m/s" else "wheel_speed"
-            c = replace(c, scores={role: c.scores["ground_speed"] + _UNCLEAR})
-        found.append(c)
-    return found
+            frames.setdefault(c.address[: match.start()], []).append(i)
+    for i in (i for own in frames.values() if len(own) > 1 for i in own):
+        c = columns[i]
+        role = "rim_speed" if c.kind == "m/s" else "wheel_speed"
+        columns[i] = replace(c, scores={role: c.scores["ground_speed"] + _UNCLEAR})
+    return columns
 
 
 def _candidate(recording: Recording, name: str, ambiguous: bool, steady: bool) -> Candidate:
@@ -221,8 +213,7 @@ def _candidate(recording: Recording, name: str, ambiguous: bool, steady: bool) -
     unit = stated if dimension(stated) else _unit_by_name(name)
     kind = dimension(unit) if unit else None
     own = behaviour(values)
-    if steady:
-        own = replace(own, constant=False)
+    own = replace(own, constant=own.constant and not steady)
     # the name of a topic says what its fields are of: /motor/left: current
     topic = f"{recording.name} {name}" if recording.name else name
     scores = name_scores(topic)
@@ -249,12 +240,13 @@ def _unit_by_name(name: str) -> str:
     if "adc" in words_of(name):
         return "count"
     unit = unit_in_name(name)
-    if not unit or len(unit) > 1:
-        return unit
-    kind = dimension(unit)
-    roles = name_scores(re.split(r"[_\s.\-]+", name)[0])
-    wanted = [(ROLES[role][0], *_ALSO.get(role, ())) for role in roles if role in ROLES]
-    return "" if wanted and not any(kind in kinds for kinds in wanted) else unit
+    roles = name_scores(re.split(r"[_\s.\-]+", name)[0]).keys() & ROLES.keys()
+    wanted = {kind for role in roles for kind in _kinds_of(role)}
+    return "" if len(unit) == 1 and wanted and dimension(unit) not in wanted else unit
+
+
+def _kinds_of(role: str) -> tuple[str, ...]:
+    return ROLES[role][0], *_ALSO.get(role, ())
 
 
 def _score(column: Candidate, role: str, score: float, values: Floats) -> float:
@@ -266,10 +258,9 @@ def _score(column: Candidate, role: str, score: float, values: Floats) -> float:
         if kind not in (None, "s"):
             return 0.0
         if score > 0.0 or kind == "s":
-            # a named clock may jitter: that it rises is enough
-            return rises(values) * (score + (2.0 if kind == "s" else 0.0) + 1.0)
-        return 0.0 if COUNTERS & {*words_of(column.name)} else looks_like_time(values)
-    wanted = (ROLES[role][0], *_ALSO.get(role, ()))
+            return clock_score(values, True) * (score + (2.0 if kind == "s" else 0.0) + 1.0)
+        return 0.0 if says(column.name, COUNTERS) else clock_score(values, False)
+    wanted = _kinds_of(role)
     if is_raw_signal(column.unit) and role in CALIBRATED and (kind == "1" or kind not in wanted):
         kind = None  # the name decides
     if kind is not None:
@@ -281,7 +272,7 @@ def _score(column: Candidate, role: str, score: float, values: Floats) -> float:
             return 0.0
         if kind == "count" and role == "wheel_angle":
             score -= 0.5  # an angle beside it needs no counts of a turn
-        score += 2.5 if kind not in ("1",) else 2.0 if role == "slip" and score > 0.0 else 1.0
+        score += 2.5 if kind != "1" else 2.0 if role == "slip" and score > 0.0 else 1.0
         if score <= 2.5 and (role, kind) not in _UNIT_SUFFICES:
             return 0.0
     if score <= 0.0:
@@ -296,19 +287,14 @@ def _score(column: Candidate, role: str, score: float, values: Floats) -> float:
     if role in ("wheel_speed", "ground_speed", "torque", "motor_current") and monotone:
         score -= 2.0
     if role == "load" and own.middle != 0.0:
-        steady = abs(own.high - own.low) < 1.5 * abs(own.middle)
-        score += 1.0 if steady else -0.5
-    if role == "drawbar_pull" and abs(own.high - own.low) < 0.3 * abs(own.middle):
+        score += 1.0 if own.span < 1.5 * abs(own.middle) else -0.5
+    if role == "drawbar_pull" and own.span < 0.3 * abs(own.middle):
         score -= 1.5  # a pull varies with slip
-    if role == "slip" and kind is None and own.size > 150.0:
-        score -= 4.0
-    if role == "load" and kind is None and own.size < _LEAST_LOAD:
-        score -= 4.0
-    if role == "sinkage" and kind is None and own.high - own.low > _MOST_SINKAGE:
-        score -= 8.0  # no wheel sinks in by as many mm: a raw signal
-    if words_of(column.name)[:1] == ["std"]:
-        score -= 3.0
-    return score
+    if kind is None:  # of no size that the role may have
+        score -= 4.0 * (role == "slip" and own.size > 150.0)
+        score -= 4.0 * (role == "load" and own.size < _LEAST_LOAD)
+        score -= 8.0 * (role == "sinkage" and own.span > _MOST_SINKAGE)
+    return score - 3.0 * (words_of(column.name)[:1] == ["std"])
 
 
 def liveliest(runs: Sequence[Run]) -> Run:
@@ -318,21 +304,16 @@ def liveliest(runs: Sequence[Run]) -> Run:
     )
 
 
-def describe(columns: Sequence[Candidate]) -> list[str]:
-    """A line for each column: its name, unit and range."""
-    width = max((len(c.address) for c in columns), default=0)
-    return [
-        f"{c.address:<{min(width, 44)}}  {c.unit or '-':<7} {c.about.low:>11.5g} .. "
+def describe(columns: Sequence[Candidate], recordings: Sequence[Recording]) -> list[str]:
+    """A line for each column: name, unit and range; and for those of text, which no channel is."""
+    width = min(max((len(c.address) for c in columns), default=0), 44)
+    lines = [
+        f"{c.address:<{width}}  {c.unit or '-':<7} {c.about.low:>11.5g} .. "
         f"{c.about.high:<11.5g}" + (" constant" if c.about.constant else "")
         for c in columns
     ]
-
-
-def describe_texts(recordings: Sequence[Recording]) -> list[str]:
-    """A line for each column that holds text, which no channel can be."""
-    lines = []
-    for recording in recordings:
-        for name, cells in recording.texts.items():
-            shown = list(dict.fromkeys(cell[:20] for cell in cells if cell))[:3]
-            lines.append(f"{name[:44]}: text, such as {', '.join(map(repr, shown))}")
-    return lines[:_MOST_TEXTS]
+    texts = [own for recording in recordings for own in recording.texts.items()][:_MOST_TEXTS]
+    for name, cells in texts:
+        shown = list(dict.fromkeys(cell[:20] for cell in cells if cell))[:3]
+        lines.append(f"{name[:44]}: text, such as {', '.join(map(repr, shown))}")
+    return lines

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import dimension, factor
 
+#: Constants by name: as they would be written in a map, and the line that states them.
+Stated = dict[str, tuple[str, str]]
+
 _VALUE = r"\s*(?:\[[^\]]*\]|\([^)]*\))?\s*[:=,;\t ][:=,;\s]*"
 _VALUE += r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s*([A-Za-z/%°*^0-9-]*)"
 _UNIT_BEFORE = re.compile(r"(?:[\[(]\s*([^\])]*)\s*[\])]|_(mm|cm|m|kg|n)\b)", re.IGNORECASE)
@@ -17,7 +20,7 @@ _UNIT_BEFORE = re.compile(r"(?:[\[(]\s*([^\])]*)\s*[\])]|_(mm|cm|m|kg|n)\b)", re
 _STATED = {
     "radius": (
         r"(?:wheel[ _]?|rad)?(?:radius|radius[ _]wheel|wheel[ _]r|r[ _]?wheel|r(?=\s*[=:])"
-        r"|rayon(?: \w+){0,3}|radio(?: \w+){0,3}|raggio(?: \w+){0,3})",
+        r"|(?:rayon|radio|raggio)(?: \w+){0,3})",
         "m",
     ),
     "diameter": (
@@ -62,18 +65,18 @@ _CONSTANTS_IN_NAMES = tuple(
 )
 #: Units of a length without one, and radii of wheels, m.
 _LENGTHS, _LEAST, _MOST = (("m", 1.0), ("cm", 0.01), ("mm", 0.001)), 0.02, 0.7
+_IN_MM = {"radius": 2.0, "diameter": 4.0}  # Length without a unit above which it is in mm
 
 
-def stated_constants(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Constants by name: as they would be written in a map, and the line that states them."""
-    found: dict[str, tuple[str, str]] = {}
+def stated_constants(lines: Sequence[str]) -> Stated:
+    """Constants that lines state."""
+    found: Stated = {}
     for line in lines:
         if "wheels" not in found and (wheels := _WHEELS.search(line)):
             found["wheels"] = (wheels[1] or wheels[2], line)
         for name, (words, ours) in _STATED.items():
-            if name in found:
-                continue
-            match = re.search(rf"\b{words}(?:_(?:mm|cm|m|kg|n))?\b{_VALUE}", line, re.IGNORECASE)
+            text = rf"\b{words}(?:_(?:mm|cm|m|kg|n))?\b{_VALUE}"
+            match = None if name in found else re.search(text, line, re.IGNORECASE)
             if match is None:
                 continue
             number, unit = match[1].replace(",", "."), match[2].strip()
@@ -84,26 +87,22 @@ def stated_constants(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
                 continue
             if not unit and (before := _UNIT_BEFORE.search(line[match.start() : match.start(1)])):
                 unit = before[1] or before[2]
-            if ours == "Hz":
-                found[name] = (f"{number} Hz", line)
-            elif unit and dimension(unit) in (ours, "1" if ours == "1" else ours):
-                found[name] = (f"{number} {unit}", line)
-            elif not unit or dimension(unit) is None:
-                plausible = {"radius": 2.0, "diameter": 4.0}.get(name)
-                if plausible is not None and float(number) > plausible:
-                    number += " mm"
-                found[name] = (number, line)
-    if "diameter" in found and "radius" in found:
-        del found["diameter"]
+            if ours == "Hz" or (unit and dimension(unit) == ours):
+                found[name] = (f"{number} {'Hz' if ours == 'Hz' else unit}", line)
+            elif dimension(unit) is None:
+                in_mm = float(number) > _IN_MM.get(name, math.inf)
+                found[name] = (number + " mm" * in_mm, line)
+    if "radius" in found:
+        found.pop("diameter", None)
     return found
 
 
-def stated_radius(stated: dict[str, tuple[str, str]]) -> float:
+def stated_radius(stated: Stated) -> float:
     """Radius in m that a log states, itself or as a diameter; 0 where it states none."""
     for name, share in (("radius", 1.0), ("diameter", 0.5)):
         if name in stated:
             number, _, unit = stated[name][0].partition(" ")
-            return share * float(number) * (factor(unit, "m", name) if unit else 1.0)
+            return share * float(number) * factor(unit, "m", name)
     return 0.0
 
 
@@ -111,8 +110,7 @@ def stated_radius(stated: dict[str, tuple[str, str]]) -> float:
 class StatedConstants:
     """Constants that logs state in the lines before their headers, by name."""
 
-    # Those that all logs state alike: as they would be written in a map, and the line
-    common: dict[str, tuple[str, str]]
+    common: Stated  # Those that all logs state alike
     # Those that differ: a pattern for the number in the line, its unit, and the numbers
     of_each: dict[str, tuple[str, str, list[str]]]
 
@@ -123,37 +121,36 @@ def agreed_constants(logs: Sequence[Sequence[Recording]]) -> StatedConstants:
     named = [constants_in_name(log[0].file.stem) for log in logs]
     alike, differing = {}, {}
     for name in dict.fromkeys(name for found in each for name in found):
-        values = list(dict.fromkeys(found[name][0] for found in each if name in found))
-        value, line = next(found[name] for found in each if name in found)
-        if len(values) == 1:
-            alike[name] = (value, line)
-            continue
+        said = [found[name] for found in each if name in found]
+        values = list(dict.fromkeys(value for value, _ in said))
+        value, line = said[0]
         number, _, unit = value.partition(" ")
         start = max(line.find(number), line.find(number.replace(".", ",")))
-        if start > 0 and all(name in found for found in each):
+        if len(values) == 1:
+            alike[name] = said[0]
+        elif start > 0 and len(said) == len(each):
             pattern = re.escape(line[:start]).replace("\\ ", " ") + r"([+-]?\d+(?:[.,]\d+)?)"
             differing[name] = (pattern, unit, values)
-    for name, said in named[0].items():
-        lengths = {"radius", "diameter"}
-        there = lengths & alike.keys() if name in lengths else {name} & alike.keys()
-        if not there and all(own.get(name, ("",))[0] == said[0] for own in named):
-            alike[name] = said
+    for name, one in named[0].items():
+        same = {"radius", "diameter"} if name in ("radius", "diameter") else {name}
+        if not same & alike.keys() and all(own.get(name, ("",))[0] == one[0] for own in named):
+            alike[name] = one
     return StatedConstants(alike, differing)
 
 
-def constants_in_name(name: str) -> dict[str, tuple[str, str]]:
+def constants_in_name(name: str) -> Stated:
     """Constants that the name of a file states, as `WHEELDIAMETER25.0_GEARRATIO6` does.
 
     A length without a unit is taken in that of m, cm and mm which fits a wheel, and says so.
     """
-    found: dict[str, tuple[str, str]] = {}
+    found: Stated = {}
     for constant, pattern in _CONSTANTS_IN_NAMES:
         match = re.search(pattern, name, re.IGNORECASE)
         if match is None or constant in found or ("radius" in found and constant == "diameter"):
             continue
         number, unit = match[1].replace("p", "."), match[2] or ""
         said = f"name of the file: {match[0]}"
-        if constant in ("radius", "diameter") and not unit:
+        if constant != "gear_ratio" and not unit:
             size = float(number) / (2.0 if constant == "diameter" else 1.0)
             unit = next((u for u, one in _LENGTHS if _LEAST < size * one < _MOST), "")
             said = f"{said}; CHANGE where that is not {unit}"
@@ -162,20 +159,18 @@ def constants_in_name(name: str) -> dict[str, tuple[str, str]]:
     return found
 
 
-def gears_in_names(names: Sequence[str]) -> tuple[str, dict[str, tuple[str, str]]] | None:
+def gears_in_names(names: Sequence[str]) -> tuple[str, Stated] | None:
     """Wheels of different radius that the names of files tell apart, as `R130mm` and `R150mm` do.
 
     A pattern that finds the wheel in each name; and by wheel radius or diameter, and its value as
     it would be written in a map. None where a name says neither, or all say the same.
     """
     for constant, words in _CONSTANTS_IN_NAMES:
-        if constant not in ("radius", "diameter"):
-            continue
         own = [constants_in_name(name).get(constant) for name in names]
         matches = [re.search(words, name, re.IGNORECASE) for name in names]
         gears = {m[0]: (constant, said[0]) for m, said in zip(matches, own, strict=True)
                  if m and said}  # fmt: skip
-        if len(gears) > 1 and all(matches) and all(own):
+        if constant != "gear_ratio" and len(gears) > 1 and all(matches) and all(own):
             return "(?i)" + re.sub(r"\((?!\?)", "(?:", words), gears
     return None
 
@@ -183,9 +178,7 @@ def gears_in_names(names: Sequence[str]) -> tuple[str, dict[str, tuple[str, str]
 def number_in_names(role: str, names: Sequence[str]) -> tuple[str, str, list[float]] | None:
     """A pattern that finds a number for a role in all names of runs, its unit and the numbers."""
     for kind, pattern, unit in _IN_NAMES:
-        if kind != role:
-            continue
         matches = [re.search(pattern, name, re.IGNORECASE | re.ASCII) for name in names]
-        if all(matches):
+        if kind == role and all(matches):
             return pattern, unit, [float(m[1].replace("p", ".")) for m in matches if m]
     return None

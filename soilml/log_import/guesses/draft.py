@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,31 +13,30 @@ from soilml.errors import SoilmlError
 from soilml.io.declared_settings import take_declared
 from soilml.io.toml_settings import Settings
 from soilml.log_import.channels.inputs import Inputs, moving, wheel_inputs
+from soilml.log_import.channels.resampling import on_grid
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import Candidate
 from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.mapping.uncertain_value import Uncertain
 from soilml.log_import.mapping.written_map import WrittenTable
+from soilml.log_import.units import spelling
+
+#: Slips from which a radius follows; fewest samples; scatter of the radius over it.
+_SLIPS, _FEWEST, _SCATTER = (0.0, 0.9), 20, 0.05
 
 
 @dataclass
 class Draft(WrittenTable):
     """The table of one channel, and the column that it is guessed to be."""
 
-    column: Candidate | None = None
+    column: Candidate = field(kw_only=True)
 
     def only(self, path: str, keys: Sequence[str]) -> Draft:
         """The draft as a table of another path, with some of its keys."""
         kept = {key: value for key, value in self.keys.items() if key in keys}
         after = self.after if "column" in kept else []
         return Draft(path, kept, self.comments, after=after, column=self.column)
-
-
-def keys_alike(drafts: Sequence[Draft]) -> list[str]:
-    """The keys that the drafts of all wheels have alike."""
-    first = drafts[0].keys
-    return [k for k, v in first.items() if all(k in d.keys and d.keys[k] == v for d in drafts)]
 
 
 def inputs_of(drafts: dict[str, Draft], run: Run) -> Inputs | None:
@@ -72,3 +72,26 @@ def fastest_ratio(inputs: Inputs) -> float:
     ratio = travel_over_rotation(driving_means(inputs, 2.0))
     ratio = ratio[np.isfinite(ratio)]
     return float(np.percentile(ratio, 95)) if ratio.size > 1 else float("nan")
+
+
+def radius_of_slip(inputs: Inputs, slip: Candidate, run: Run) -> tuple[float, float]:
+    r"""Radius in m at which a logged slip is that of rotation and travel, and its scatter over it.
+
+    .. math:: r = v / (\omega (1 - s))
+
+    A slip that was computed from both has next to no scatter, one that was set has theirs. NaN
+    where there is no such radius.
+    """
+    rotation, ground = inputs.values.get("wheel_speed"), inputs.values.get("ground_speed")
+    if rotation is None or ground is None:
+        return math.nan, math.nan
+    percent = spelling(slip.unit) == "percent" or slip.about.size > 1.5
+    own = (0.01 if percent else 1.0) * on_grid(inputs.time, *run.find(slip.address))
+    driven = moving(inputs) & (own > _SLIPS[0]) & (own < _SLIPS[1]) & (np.abs(rotation) > 0.0)
+    radii = np.abs(ground[driven] / rotation[driven]) / (1.0 - own[driven])
+    radii = radii[np.isfinite(radii)]
+    if radii.size < _FEWEST:
+        return math.nan, math.nan
+    middle = float(np.median(radii))
+    spread = float(np.median(np.abs(radii - middle)))
+    return (middle, spread / middle) if spread < _SCATTER * middle else (math.nan, math.nan)

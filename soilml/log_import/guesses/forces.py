@@ -8,7 +8,7 @@ what either has of the load.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +21,10 @@ from soilml.log_import.guesses.vertical_axis import axis_in, families, with_sink
 from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import factor
 
-_FORCES = {"f", "fx", "fy", "fz", "force", "forces", "kraft", "fuerza", "forza", "力"}
-_MOMENTS = {"m", "mx", "my", "mz", "t", "tx", "ty", "tz", "moment", "torque", "drehmoment", "tau"}
-_MOMENTS |= {"momento", "couple", "coppia"}
-#: Words of cells that carry a wheel together, whose forces are added.
-_TOGETHER = {"lc", "cell", "zelle", "celda", "cella", "corner"}
-#: Words before the number of a wheel.
-_OF_WHEELS = {"wheel", "rad", "motor", "joint", "axle", "leg"}
+_FORCES = {*words_of("f fx fy fz force forces kraft fuerza forza 力")}
+_MOMENTS = {*words_of("m mx my mz t tx ty tz moment torque drehmoment tau momento couple coppia")}
+#: Words of cells that carry a wheel together, whose forces are added; before the number of a wheel.
+_NOT_ALIKE = {*words_of("lc cell zelle celda cella corner wheel rad motor joint axle leg")}
 _BLOCKS, _FEWEST = 240, 12  # Means of which the behaviour is judged: most and fewest
 _DRIVES = 0.3  # Share of the usual speed from which a wheel drives
 #: How much larger the load is than another force; its scatter over its size; correlation of pull
@@ -35,14 +32,6 @@ _DRIVES = 0.3  # Share of the usual speed from which a wheel drives
 _CLEARLY, _STEADY, _TOGETHER_FROM, _VARIES = 1.3, 0.6, 0.6, 0.02
 _BY_BEHAVIOUR = 9.0  # Score of a column whose behaviour shows the role
 _ROLES = ("load", "drawbar_pull", "torque")
-
-
-@dataclass(frozen=True)
-class Behaved:
-    """Candidates with the scores that their behaviour gives them, and a reason by role."""
-
-    candidates: list[Candidate]
-    reasons: dict[str, str]
 
 
 class Means:
@@ -64,89 +53,87 @@ class Means:
         known = np.isfinite(means)
         return np.where(known, means, np.median(means[known])) if known.any() else None
 
-    def level(self, address: str) -> float:
-        """Median while driving; NaN where there is none."""
-        own = self.of(address)
-        return float(np.median(own[self.driving])) if own is not None else float("nan")
-
     def _motion(self, candidates: Sequence[Candidate]) -> NDArray[np.bool_]:
-        every = np.ones(self.count, dtype=bool)
-        best: tuple[float, Floats] | None = None
-        for role in ("wheel_speed", "rim_speed", "wheel_angle", "ground_speed", "position"):
-            for c in candidates:
-                score = c.scores.get(role, 0.0)
-                if score <= 2.0 or (best is not None and score <= best[0]):
-                    continue
-                if (own := self.of(c.address)) is not None:
-                    place = role in ("wheel_angle", "position")
-                    best = (score, np.abs(np.gradient(own) if place and own.size > 2 else own))
-        if best is None:
-            return every
-        driving: NDArray[np.bool_] = best[1] > _DRIVES * float(np.percentile(best[1], 90))
-        return driving if driving.sum() > 2 else every
+        speeds = [
+            (c.scores.get(role, 0.0), role in ("wheel_angle", "position"), own)
+            for role in ("wheel_speed", "rim_speed", "wheel_angle", "ground_speed", "position")
+            for c in candidates
+            if c.scores.get(role, 0.0) > 2.0 and (own := self.of(c.address)) is not None
+        ]
+        if speeds:
+            _, is_place, best = max(speeds, key=lambda s: s[0])
+            speed = np.abs(np.gradient(best) if is_place and best.size > 2 else best)
+            driving: NDArray[np.bool_] = speed > _DRIVES * float(np.percentile(speed, 90))
+            if driving.sum() > 2:
+                return driving
+        return np.ones(self.count, dtype=bool)
 
 
 def _in_newton(candidate: Candidate) -> float:
     """What a force or moment is multiplied by to be in N or N m; 1 where it states no unit."""
-    if candidate.kind in ("N", "N m"):
-        return factor(candidate.unit, candidate.kind, candidate.address)
-    if candidate.kind == "kg":
-        return 9.80665 * factor(candidate.unit, "kg", candidate.address)
-    return 1.0
+    if candidate.kind not in ("N", "N m", "kg"):
+        return 1.0
+    weight = 9.80665 if candidate.kind == "kg" else 1.0
+    return weight * factor(candidate.unit, candidate.kind, candidate.address)
 
 
 def _is_alike(candidate: Candidate, moments: bool) -> bool:
     words = {*words_of(candidate.name)}
-    if words & (_TOGETHER | _OF_WHEELS) or candidate.about.count < 2 or candidate.about.constant:
+    if words & _NOT_ALIKE or candidate.about.count < 2 or candidate.about.constant:
         return False
     if candidate.kind is not None:
         return candidate.kind in (("N m",) if moments else ("N", "kg"))
     return bool(words & (_MOMENTS if moments else _FORCES))
 
 
-def by_behaviour(candidates: Sequence[Candidate], run: Run) -> Behaved:
+def by_behaviour(
+    candidates: Sequence[Candidate], run: Run
+) -> tuple[list[Candidate], dict[str, str]]:
     """Give the load, the pull and the torque of alike columns the roles that they behave as.
 
-    A place along the axis of the load is the sinkage.
+    A place along the axis of the load is the sinkage. Returns the candidates with the scores that
+    their behaviour gives them, and a reason by role.
     """
     of_forces = families(c for c in candidates if _is_alike(c, False))
     of_moments = families(c for c in candidates if _is_alike(c, True))
     forces, moments = ([*own[0].values()] if own else [] for own in (of_forces, of_moments))
     if forces and not moments:  # a single moment, of whatever axis
-        moments = [c for c in candidates if _is_alike(c, True)][:2]
-        moments = moments if len(moments) == 1 else []
-    if not forces and not moments:
-        return Behaved(list(candidates), {})
-    means = Means(run, candidates, (forces or moments)[0].address)
-    if means.count < _FEWEST:
-        return Behaved(list(candidates), {})
+        single = [c for c in candidates if _is_alike(c, True)]
+        moments = single if len(single) == 1 else []
+    groups = [*forces, *moments]
+    means = Means(run, candidates, groups[0].address) if groups else None
+    if means is None or means.count < _FEWEST:
+        return list(candidates), {}
     given: dict[str, str] = {}
     reasons: dict[str, str] = {}
-    named = _named(candidates, [*forces, *moments], means)
-    load = _load(forces, means, reasons) if forces and "load" not in named else None
-    if load is not None:
+    named = _named(candidates, groups, means)
+    if "load" not in named and (load := _load(forces, means, reasons)):
         given["load"] = load
-    steady = load or named.get("load", "")
-    weight = means.of(steady) if steady else None
+    steady = given.get("load") or named.get("load", "")
     pulls = [c.address for c in forces if c.address != steady]
-    if "drawbar_pull" in named:
-        pulls = [named["drawbar_pull"]]
-    turning = [named["torque"]] if "torque" in named else [c.address for c in moments]
-    if "torque" not in named and not turning and "motor_current" in named:
+    pulls = [named["drawbar_pull"]] if "drawbar_pull" in named else pulls
+    turning = [c.address for c in moments]
+    turning = [named["torque"]] if "torque" in named else turning
+    if not turning and "motor_current" in named:
         turning = [named["motor_current"]]
-    pair = _pair(pulls, turning, weight, means, steady)
-    for role, address, others in (("drawbar_pull", pair[0], forces), ("torque", pair[1], moments)):
-        if address and role not in named and any(c.address == address for c in others):
+    *pair, together = _pair(pulls, turning, means, steady)
+    for role, address, others in zip(_ROLES[1:], pair, (forces, moments), strict=True):
+        alone = role == "torque" and len(moments) == 1 and together < _TOGETHER_FROM
+        if role not in named and not alone and any(c.address == address for c in others):
             given[role] = address
             reasons[role] = "pull and torque vary together"
-            if pair[2] < _TOGETHER_FROM:
+            if together < _TOGETHER_FROM:
                 reasons[role] = Marked(
                     "CHANGE: of its kind it varies most as the wheel drives, which says little"
                 )
-    known = [c.address for c in moments]
-    if len(known) == 1 and given.get("torque") == known[0] and pair[2] < _TOGETHER_FROM:
-        given.pop("torque"), reasons.pop("torque")
-    found = _rescored(candidates, forces, moments, given)
+    # an axis that is none of the roles of its group is no other of them either
+    decided = {c.address for c in forces if {"load", "drawbar_pull"} & given.keys()}
+    decided |= {c.address for c in moments if "torque" in given}
+    found = []
+    for c in candidates:
+        scores = {r: s for r, s in c.scores.items() if c.address not in decided or r not in _ROLES}
+        scores |= {role: _BY_BEHAVIOUR for role, address in given.items() if address == c.address}
+        found.append(replace(c, scores=scores))
     vertical = axis_in(of_forces[0], given["load"]) if "load" in given else ""
     if vertical and not isinstance(reasons["load"], Marked):
         found, sinkage = with_sinkage_along(found, vertical)
@@ -154,7 +141,7 @@ def by_behaviour(candidates: Sequence[Candidate], run: Run) -> Behaved:
             reasons["sinkage"] = Marked(
                 f"CHANGE: a place along {vertical}, the axis of the load: is it the wheel's height?"
             )
-    return Behaved(found, reasons)
+    return found, reasons
 
 
 def _named(
@@ -164,50 +151,41 @@ def _named(
     inside = {c.address for c in groups}
     found = {}
     for role in (*_ROLES, "motor_current"):
-        own = [
-            c
-            for c in candidates
-            if c.address not in inside
-            and c.scores.get(role, 0.0) >= _BY_BEHAVIOUR
-            and means.of(c.address) is not None
-        ]
+        own = [c for c in candidates if c.address not in inside
+               and c.scores.get(role, 0.0) >= _BY_BEHAVIOUR]  # fmt: skip
+        own = [c for c in own if means.of(c.address) is not None]
         if own:
             found[role] = max(own, key=lambda c: c.scores[role]).address
     return found
 
 
-def _load(forces: Sequence[Candidate], means: Means, reasons: dict[str, str]) -> str | None:
-    """The largest force that is steady while the wheel drives."""
-    sizes = []
-    for c in forces:
-        own = means.of(c.address)
-        if own is None:
-            continue
-        driven = own[means.driving]
-        level = abs(float(np.median(driven)))
-        if level > 0.0 and float(np.std(driven)) < _STEADY * level:
-            sizes.append((level, c.address))
-    sizes.sort(reverse=True)
-    if not sizes:
-        return None
-    others = [abs(means.level(c.address)) for c in forces if c.address != sizes[0][1]]
-    most = max((x for x in others if np.isfinite(x)), default=0.0)
-    reasons["load"] = f"the largest steady force of {len(forces)}"
-    if sizes[0][0] < _CLEARLY * most:
-        reasons["load"] = Marked(
-            f"CHANGE: one of {len(forces)} forces; another one is {most / sizes[0][0]:.0%} of it"
-        )
-    return sizes[0][1]
+def _load(forces: Sequence[Candidate], means: Means, reasons: dict[str, str]) -> str:
+    """The largest force that is steady while the wheel drives; "" for none."""
+    driven = {c.address: own[means.driving] for c in forces
+              if (own := means.of(c.address)) is not None}  # fmt: skip
+    levels = {address: abs(float(np.median(own))) for address, own in driven.items()}
+    steady = {a: level for a, level in levels.items() if np.std(driven[a]) < _STEADY * level}
+    best = max(steady, key=lambda a: (steady[a], a), default="")
+    if best:
+        most = max((level for a, level in levels.items() if a != best), default=0.0)
+        reasons["load"] = f"the largest steady force of {len(forces)}"
+        if levels[best] < _CLEARLY * most:
+            share = f"{most / levels[best]:.0%}"
+            reasons["load"] = Marked(
+                f"CHANGE: one of {len(forces)} forces; another one is {share} of it"
+            )
+    return best
 
 
 def _pair(
-    pulls: Sequence[str], turning: Sequence[str], weight: Floats | None, means: Means, load: str
+    pulls: Sequence[str], turning: Sequence[str], means: Means, load: str
 ) -> tuple[str, str, float]:
     """Pull and torque: the force and the moment that vary most together, and their correlation.
 
     What varies with the load is taken off first: lateral forces and the moments that they make.
     """
-    size = abs(means.level(load)) if load else 0.0
+    weight = means.of(load) if load else None
+    size = abs(float(np.median(weight[means.driving]))) if weight is not None else 0.0
     left = {
         address: _beside(own, weight)
         for address in (*pulls, *turning)
@@ -235,25 +213,3 @@ def _beside(own: Floats, weight: Floats | None) -> Floats:
         return rest  # nothing of note: the load did not change
     share = weight - weight.mean()
     return np.asarray(rest - share * float(share @ rest) / float(share @ share))
-
-
-def _rescored(
-    candidates: Sequence[Candidate],
-    forces: Sequence[Candidate],
-    moments: Sequence[Candidate],
-    given: dict[str, str],
-) -> list[Candidate]:
-    """Candidates whose roles are those of their behaviour, within the groups that it decides.
-
-    An axis that is none of the roles of its group is no other of them either.
-    """
-    roles = {address: role for role, address in given.items()}
-    decided = {c.address for c in forces if {"load", "drawbar_pull"} & given.keys()}
-    decided |= {c.address for c in moments if "torque" in given}
-    found = []
-    for c in candidates:
-        scores = {r: s for r, s in c.scores.items() if c.address not in decided or r not in _ROLES}
-        if c.address in roles:
-            scores[roles[c.address]] = _BY_BEHAVIOUR
-        found.append(replace(c, scores=scores))
-    return found

@@ -11,43 +11,33 @@ from soilml.log_import.channels.runs import matched_files, run_names, runs_of
 from soilml.log_import.guesses.absent_channels import AbsentChannels
 from soilml.log_import.guesses.channel_drafts import add_errors, draft_channels, is_error
 from soilml.log_import.guesses.clocks_and_runs import (
-    clocks_differ,
     guess_clock,
     guess_file_kinds,
     guess_run_column,
     guess_wheel_column,
     lines_of_first,
-    pauses,
     refuse_a_table_of_runs,
-    restarts,
+    restarts_and_pauses,
     rows_are_runs,
     run_of_rows,
     structs_are_runs,
-    why_time_unit,
 )
 from soilml.log_import.guesses.columns import (
     candidates_of,
     describe,
-    describe_texts,
     is_size,
     liveliest,
     name_scores,
-    words_of,
+    says,
 )
 from soilml.log_import.guesses.constants import agreed_constants, gears_in_names, stated_radius
-from soilml.log_import.guesses.draft import Draft, fastest_ratio, inputs_of, keys_alike
-from soilml.log_import.guesses.evidence import as_table, mark, weigh
+from soilml.log_import.guesses.draft import Draft, fastest_ratio, inputs_of, radius_of_slip
+from soilml.log_import.guesses.evidence import weigh
 from soilml.log_import.guesses.forces import by_behaviour
 from soilml.log_import.guesses.roles import assign, axle_of
-from soilml.log_import.guesses.wheel_radius import COMPUTED, PLAUSIBLE, radius_of_slip
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap, RunsMap, TimeMap
-from soilml.log_import.mapping.written_map import (
-    Marked,
-    WrittenMap,
-    WrittenTable,
-    toml_value,
-)
+from soilml.log_import.mapping.written_map import Marked, WrittenMap, WrittenTable, toml_value
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
 
@@ -58,6 +48,8 @@ _MOST_LISTED, _LOOKED = 40, 8  # Most columns that are listed, and runs that are
 _OF_PLATES = {"plate", "pressure", "penetration", "annulus", "shear", "platte", "druck"}
 #: Calibration errors that all rows share, where nothing states one.
 _BIASES = {"torque": "2 %", "load": "1 %"}
+#: Radii of wheels, m; largest scatter over the radius of a slip that was computed from both speeds.
+_PLAUSIBLE, _COMPUTED = (0.02, 0.7), 0.002
 
 
 class MapGuess:
@@ -67,20 +59,15 @@ class MapGuess:
         self.logs = logs
         for log in logs:
             refuse_a_table_of_runs(log)
-        first = [recording for log in logs[:4] for recording in log]
-        self.steady = rows_are_runs(logs)
-        self.labels: list[str] = []
         self.stated = agreed_constants(logs)
+        self.steady = rows_are_runs(logs)
+        self.labels: list[str] = []  # Of wheels that take turns in the lines of a log
         self.time, self.time_why = TimeMap(rate=100.0), ""
-        self.runs_map, self.runs_table = self._divided(logs[0])
-        if self.labels:
-            first = lines_of_first(first, self.runs_map.column)
-        if not self.steady:
-            self.time, self.time_why = self._clock(first)
-        if not (self.runs_map.column or self.steady):
-            self.runs_map, self.runs_table = self._divided_by_time(logs[0])
+        self.runs_map, self.runs_table = RunsMap(), WrittenTable("runs")
+        self._divide([recording for log in logs[:4] for recording in log])
         self.kinds = self._with_clocks(guess_file_kinds(logs))
         self.runs = runs_of(logs, self._map(self.kinds))
+        self.run_names = [run.name for run in self.runs]
         self.run = liveliest(self.runs[:_LOOKED])
         clocks = {self.time.column, *(kind.time_column for kind in self.kinds)}
         columns = candidates_of(self.run.recordings, self.steady > 0)
@@ -88,52 +75,48 @@ class MapGuess:
         self.errors = [c for c in self.columns if is_error(c)] if self.steady else []
         sizes = [c for c in self.columns if is_size(c.name) and c.kind in (None, "m")]
         self.usable = [c for c in self.columns if c not in self.errors and c not in sizes]
-        behaved = by_behaviour(self.usable, self.run)
-        self.reasons = behaved.reasons
-        self.found = assign(behaved.candidates)
-        self.run_names = [run.name for run in self.runs]
+        candidates, self.reasons = by_behaviour(self.usable, self.run)
+        self.found = assign(candidates)
         self.evidence = ""
 
     def _map(self, kinds: Sequence[FileKind]) -> LogMap:
         return LogMap("map", files=tuple(kinds), time=self.time, runs=self.runs_map)
 
-    def _clock(self, first: Sequence[Recording]) -> tuple[TimeMap, str]:
-        column, unit = guess_clock(first)
-        if column or any(recording.clock is not None for recording in first):
-            return TimeMap(column, unit), why_time_unit(first, column, unit)
-        rate = float(self.stated.common.get("rate", ("100", ""))[0].split()[0])
-        return TimeMap(rate=rate), ""
-
-    def _divided(self, log: Sequence[Recording]) -> tuple[RunsMap, WrittenTable]:
-        """What names the run of each line or row."""
-        table = WrittenTable("runs")
+    def _divide(self, first: Sequence[Recording]) -> None:
+        """The clock, and what divides a file into runs."""
+        log, put = self.logs[0], self.runs_table.put
         if self.steady:
-            table.put("each_row", True, f"{self.steady} rows and no time: each is a run")
+            put("each_row", True, f"{self.steady} rows and no time: each is a run")
             if name := run_of_rows(log):
-                table.put("column", name, "rows with one name were driven on one soil")
-            return RunsMap(), table
+                put("column", name, "rows with one name were driven on one soil")
+            return
         column, count = guess_run_column(log)
         why = f"{count} values, one run each"
         if not column:
             column, self.labels = guess_wheel_column(log)
             why = f"a line for each wheel ({', '.join(self.labels[:4])}): each is a run"
+        clock, unit, self.time_why = guess_clock(
+            lines_of_first(first, column) if self.labels else first
+        )
+        if clock or any(recording.clock is not None for recording in first):
+            self.time = TimeMap(clock, unit)
+        elif "rate" in self.stated.common:
+            self.time = TimeMap(rate=float(self.stated.common["rate"][0].split()[0]))
         if column:
-            table.put("column", column, why)
-        return RunsMap(column), table
-
-    def _divided_by_time(self, log: Sequence[Recording]) -> tuple[RunsMap, WrittenTable]:
-        table = WrittenTable("runs")
-        structs, again = structs_are_runs(log, self.time.column), restarts(log, self.time.column)
-        count, longest = pauses(log, self.time.column, self.time.unit)
+            self.runs_map = RunsMap(column)
+            put("column", column, why)
+            return
+        structs = structs_are_runs(log, clock)
+        again, count, pause = restarts_and_pauses(log, clock, self.time.unit)
         if structs:
-            table.put("each_struct", True, f"{structs} with the same columns")
-            return RunsMap(each_struct=True), table
+            self.runs_map = RunsMap(each_struct=True)
+            put("each_struct", True, f"{structs} with the same columns")
+            return
+        self.runs_map = RunsMap(at_reset=again > 0, at_pause=pause)
         if again:
-            why = f"the time starts again {again} times"
-            table.put("split_where_time_restarts", True, why)
+            put("split_where_time_restarts", True, f"the time starts again {again} times")
         elif count:
-            table.put("split_at_pauses_over", f"{longest:g} s", f"the log pauses {count} times")
-        return RunsMap(at_reset=again > 0, at_pause=longest), table
+            put("split_at_pauses_over", f"{pause:g} s", f"the log pauses {count} times")
 
     def _with_clocks(self, kinds: Sequence[FileKind]) -> tuple[FileKind, ...]:
         """Kinds with their own columns of time, and with clocks that overlap."""
@@ -142,34 +125,37 @@ class MapGuess:
         members = next(iter(matched_files(self.logs, kinds).values()))
         named = []
         for kind in kinds:
-            column, unit = guess_clock([recording for recording, other in members if other is kind])
+            column, unit, _ = guess_clock([own for own, other in members if other is kind])
             alike = (column, unit) == (self.time.column, self.time.unit)
             named.append(kind if alike else replace(kind, time_column=column, time_unit=unit))
-        run = runs_of(self.logs, self._map(named))[0]
-        if clocks_differ([(times[0], times[-1]) for times in run.times]):
+        times = runs_of(self.logs, self._map(named))[0].times
+        if max(own[0] for own in times) >= min(own[-1] for own in times):
             return tuple(replace(kind, clock="start") for kind in named)
         return tuple(named)
 
     def map(self, doubts: Mapping[str, str] | None = None) -> WrittenMap:
         """The whole map, with a mark on the channels that its own rows put in doubt, by role."""
         stated, shared, wheels = self.stated.common, self.found.shared, self.found.wheels
-        drafts = {
-            name: draft_channels(shared | own, self.run, stated, self.found.parts)
-            for name, own in (wheels or {"": {}}).items()
-        }
-        self.evidence = self._weighed(drafts, doubts or {})
+        constants, explained = self._constants(), []
+        drafts: dict[str, dict[str, Draft]] = {}
+        for name, own in (wheels or {"": {}}).items():
+            group = draft_channels(shared | own, self.run, stated, self.found.parts)
+            evidence = weigh(group, inputs_of(group, self.run), constants, self.found.others,
+                             self.usable, self.reasons, doubts or {})  # fmt: skip
+            explained += [f"wheel {name}\n" if name else "", *map(str, evidence)]
+            for role, draft in group.items():
+                if others := [c.address for c in self.found.others.get(role, [])[:4]]:
+                    draft.after = [f"# or: {', '.join(others)}"]
+                if role in _BIASES:
+                    draft.put("bias", _BIASES[role], "calibration error that all rows share")
+            drafts[name] = group
+        self.evidence = "".join(explained)
         first = next(iter(drafts.values()))
         add_errors(first, self.found, self.errors)
         for role, why in self.reasons.items():
             known = role in first and isinstance(first[role].comments.get("column"), Marked)
             if role in first and not (known and not isinstance(why, Marked)):
                 first[role].comments["column"] = why
-        for group in drafts.values():
-            for role, draft in group.items():
-                if others := [c.address for c in self.found.others.get(role, [])[:4]]:
-                    draft.after = [f"# or: {', '.join(others)}"]
-                if role in _BIASES:
-                    draft.put("bias", _BIASES[role], "calibration error that all rows share")
         absent = AbsentChannels(self.found, self.usable, self.stated, self.run_names)
         tables = [*self._files(), *self._time_tables(), *self._wheel_tables(first)]
         if "load" not in self.found.roles():
@@ -181,11 +167,11 @@ class MapGuess:
                 tables += absent.table(role)
         alike: dict[str, list[str]] = {}
         for role in next(iter(wheels.values()), {}):
-            alike[role] = keys_alike([own[role] for own in drafts.values()])
-            draft = first[role].only(role, alike[role])
-            draft.about = f"{ROLES[role][1]}; each wheel has a column of its own"
-            draft.after = []
-            tables.append(draft)
+            groups = [own[role].keys for own in drafts.values()]
+            keys = [k for k, v in groups[0].items() if all(d.get(k) == v for d in groups)]
+            about = f"{ROLES[role][1]}; each wheel has a column of its own"
+            alike[role] = keys
+            tables.append(replace(first[role].only(role, keys), about=about, after=[]))
         for name, own in wheels.items():
             axle = axle_of(name)
             tables.append(WrittenTable(f"wheels.{name}", {"axle": axle} if axle else {}))
@@ -193,22 +179,7 @@ class MapGuess:
                 draft = drafts[name][role]
                 left = [key for key in draft.keys if key not in alike[role]]
                 tables.append(draft.only(f"wheels.{name}.{role}", left))
-        if not self.steady:
-            tables += self._window_tables()
-        return WrittenMap(self._head(), tables)
-
-    def _weighed(self, drafts: Mapping[str, dict[str, Draft]], doubts: Mapping[str, str]) -> str:
-        """Mark the channels of each wheel without evidence; what speaks for each, as text."""
-        constants, explained = self._constants(), []
-        for name, group in drafts.items():
-            evidence = weigh(group, inputs_of(group, self.run), constants, self.found.others,
-                             self.usable, self.reasons)  # fmt: skip
-            for one in evidence:
-                if not group[one.role].is_marked:  # one mark suffices
-                    one.against = one.against or doubts.get(one.role, "")
-            mark(group, evidence)
-            explained.append((f"wheel {name}\n" if name else "") + as_table(evidence))
-        return "".join(explained)
+        return WrittenMap(self._head(), [*tables, *(() if self.steady else self._window_tables())])
 
     def _constants(self) -> dict[str, float]:
         """Radius (m) and weight on each wheel (N), as far as the logs state them."""
@@ -226,6 +197,9 @@ class MapGuess:
     def _head(self) -> list[str]:
         names = run_names([log[0].file for log in self.logs])
         shown = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
+        listed = self.columns
+        if len(listed) > _MOST_LISTED:
+            listed = [c for c in listed if not c.about.constant][:_MOST_LISTED]
         lines = [
             f"# Map of {len(names)} log{'s' if len(names) > 1 else ''}: {shown}",
             "# Written by `soilml import --init`. All of it is a guess: look at the lines with",
@@ -233,17 +207,13 @@ class MapGuess:
             '# "0.15 m +- 1 %". Forward is positive for rotation, travel and torque.',
             "#",
             "# The columns, with the unit that the log states and where 98 % of their values lie:",
+            *(f"#   {line}" for line in describe(listed, self.run.recordings)),
         ]
-        listed = self.columns
-        if len(listed) > _MOST_LISTED:
-            listed = [c for c in listed if not c.about.constant]
-        lines += [f"#   {line}" for line in describe(listed[:_MOST_LISTED])]
-        words = {word for c in self.columns for word in words_of(c.address)}
-        if words & _OF_PLATES and not self.found.roles() & {"wheel_speed", "wheel_angle", "slip"}:
+        if len(self.columns) > len(listed):
+            lines.append(f"#   and {len(self.columns) - len(listed)} more")
+        of_plates = any(says(c.address, _OF_PLATES) for c in self.columns)
+        if of_plates and not self.found.roles() & {"wheel_speed", "wheel_angle", "slip"}:
             lines.append("# Plate or shear tests, it seems: `soilml bevameter` takes those.")
-        if len(self.columns) > len(listed[:_MOST_LISTED]):
-            lines.append(f"#   and {len(self.columns) - len(listed[:_MOST_LISTED])} more")
-        lines += [f"#   {line}" for line in describe_texts(self.run.recordings)]
         notes = dict.fromkeys(note for log in self.logs for r in log for note in r.notes)
         return lines + [f"# Note: {note}" for note in list(notes)[:5]]
 
@@ -262,30 +232,27 @@ class MapGuess:
 
     def _time_tables(self) -> list[WrittenTable]:
         """Clock, and what divides the logs into runs."""
-        time = WrittenTable("time")
+        time, why = WrittenTable("time"), ""
         if self.time.column:
-            named = "time" in name_scores(self.time.column)
-            why: str = "" if named else Marked("CHANGE: its name is of no time; it rises evenly")
+            if "time" not in name_scores(self.time.column):
+                why = Marked("CHANGE: its name is of no time; it rises evenly")
             time.put("column", self.time.column, why)
             time.put("unit", self.time.unit, self.time_why)
         elif self.time.rate and not self.steady:
-            why = "stated in the log"
-            if "rate" not in self.stated.common:
-                why = Marked("CHANGE: no column is a clock")
+            known = "rate" in self.stated.common
+            why = "stated in the log" if known else Marked("CHANGE: no column is a clock")
             time.put("rate", f"{self.time.rate:g} Hz", why)
         elif not self.steady:
             time = WrittenTable(before=["# Time comes from the messages."])
         return [table for table in (time, self.runs_table) if table.keys or table.before]
 
     def _wheel_tables(self, drafts: dict[str, Draft]) -> list[WrittenTable]:
-        """[wheel]: the radius that the logs state, or that a logged slip implies."""
+        """[wheel]: the radius that the logs state, or that a logged slip implies; and [gears]."""
         wheel, stated = WrittenTable("wheel"), self.stated.common
         if several := gears_in_names(self.run_names):
             pattern, gears = several
-            shown = ", ".join(list(gears)[:4])
-            wheel.put(
-                "gear_from", pattern, f"the names say {shown}; [gears.NAME] of the model file"
-            )
+            why = f"the names say {', '.join(list(gears)[:4])}; [gears.NAME] of the model file"
+            wheel.put("gear_from", pattern, why)
             tables = [wheel]
             for name, (key, value) in gears.items():
                 plain = re.fullmatch(r"[A-Za-z0-9_-]+", name)
@@ -293,14 +260,13 @@ class MapGuess:
                 table.put(key, f"{value} +- 1 %", "by the names")
                 tables.append(table)
             return tables
-        for key in ("radius", "diameter"):
-            if key in stated and not wheel.keys:
-                value, line = stated[key]
-                why = f"stated in the log: {line[:60]}"
-                if "CHANGE" in line:
-                    why = Marked(f"stated in the {line}")
-                wheel.put(key, f"{value if ' ' in value else f'{value} m'} +- 1 %", why)
-        if not wheel.keys:
+        key = next((key for key in ("radius", "diameter") if key in stated), "")
+        if key:
+            value, line = stated[key]
+            asked = Marked(f"stated in the {line}") if "CHANGE" in line else ""
+            value = value if " " in value else f"{value} m"
+            wheel.put(key, f"{value} +- 1 %", asked or f"stated in the log: {line[:60]}")
+        else:
             self._put_implied_radius(wheel, drafts)
         return [wheel]
 
@@ -310,16 +276,15 @@ class MapGuess:
         turning = {"wheel_speed", "wheel_angle"} & roles
         needed = bool(turning) and not {"slip", "rim_speed"} & roles
         inputs = inputs_of(drafts, self.run) if turning else None
-        gear = 1.0
-        for role in {"wheel_speed", "wheel_angle"} & drafts.keys():  # rotation is of the motor
-            gear *= float(drafts[role].keys.get("gear_ratio", 1.0))
+        # where rotation is of the motor
+        gear = math.prod(float(drafts[role].keys.get("gear_ratio", 1.0)) for role in turning)
         slips = [*self.found.others.get("slip", [])]
         slips += [self.found.shared["slip"]] if "slip" in self.found.shared else []
         if inputs is not None and slips:
             radius, scatter = radius_of_slip(inputs, slips[0], self.run)
-            if PLAUSIBLE[0] < gear * radius < PLAUSIBLE[1]:
+            if _PLAUSIBLE[0] < gear * radius < _PLAUSIBLE[1]:
                 why = f"v / (omega (1 - slip)) with the slip of the column {slips[0].address!r}"
-                if scatter > COMPUTED:
+                if scatter > _COMPUTED:
                     why = Marked(f"CHANGE: {why}, which was perhaps set and not measured")
                 wheel.put("radius", f"{gear * radius:.3g} m +- 1 %", why)
                 return
@@ -327,13 +292,12 @@ class MapGuess:
         hint = ""
         if ratio > 0.0:
             hint = f"; travel over rotation is {ratio:.3g} m"
-            if PLAUSIBLE[0] < ratio < PLAUSIBLE[1]:
+            if _PLAUSIBLE[0] < ratio < _PLAUSIBLE[1]:
                 hint += " at the lowest slip: a little less"
             else:
                 hint += ": a unit is wrong, or the rotation is measured before a gearbox"
-        example = '# radius = "0.15 m +- 1 %"'
-        wheel.after.append(Marked(f"{example}  # NEEDED{hint}") if needed else
-                           f"{example}  # for checks{hint}")  # fmt: skip
+        line = f'# radius = "0.15 m +- 1 %"  # {"NEEDED" if needed else "for checks"}{hint}'
+        wheel.after.append(Marked(line) if needed else line)
 
     def _window_tables(self) -> list[WrittenTable]:
         """[windows], with shorter windows for short runs, and an example of [[leave_out]]."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from soilml.log_import.channels.inputs import Inputs, moving, resting
-from soilml.log_import.guesses.columns import words_of
+from soilml.log_import.guesses.columns import says, words_of
 from soilml.log_import.guesses.draft import Draft, driving_means
 from soilml.log_import.mapping.written_map import Marked
 
@@ -18,73 +18,66 @@ _FAR, _SUNK = 0.08, 0.01
 #: that are more than noise.
 _MOST_AT_REST, _FALLS, _STANDS = 0.3, 0.002, 0.002
 #: Words of places, whose zero may be anywhere.
-_HEIGHTS = {"height", "position", "pos", "laser", "distance", "level", "elevation", "hoehe", "höhe"}
-_HEIGHTS |= {"abstand", "weg", "altura", "hauteur", "altezza", "lvdt"}
-#: Roles that read zero while a wheel rests.
-ZERO_AT_REST = ("torque", "motor_current", "drawbar_pull")
+_HEIGHTS = words_of(
+    "height position pos laser distance level elevation hoehe höhe abstand weg altura hauteur"
+    " altezza lvdt"
+)
+#: Roles that are positive where the wheel drives forward, and why.
+_POSITIVE = {
+    "torque": "positive where it drives forward",
+    "motor_current": "positive where it drives forward",
+    "load": "a load is positive",
+    "sinkage": "sinkage is positive",
+}
 
 
 def signs(drafts: dict[str, Draft], inputs: Inputs) -> None:
-    """Turn channels that are against the rotation, so that all that drives is positive."""
-    driven = moving(inputs)
-    rotation = next((r for r in ("rim_speed", "wheel_speed") if r in inputs.values), None)
-    sign = 1.0
-    if rotation is not None:
-        sign = math.copysign(1.0, float(np.nanmedian(inputs.values[rotation][driven])))
-        source = next(r for r in ("wheel_angle", "rim_speed", "wheel_speed") if r in drafts)
-        if sign < 0.0:
-            drafts[source].put("reverse", True, "it is negative in the log; forward is positive")
-    for role, key in (("ground_speed", "ground_speed"), ("position", "ground_speed")):
-        if role in drafts and key in inputs.values:
-            middle = float(np.nanmedian(inputs.values[key][driven]))
-            if middle < 0.0:
-                drafts[role].put("reverse", True, "it is negative in the log; forward is positive")
-    for role in ("torque", "motor_current", "load", "sinkage"):
-        if role not in inputs.values or role not in drafts:
+    """Turn channels that are against the rotation, so that all that drives is positive.
+
+    Also a slip that is below zero where the torque drives, as of logs that count braking up, and a
+    pull that falls where the torque, or the current of the motor, rises.
+    """
+    driven, values = moving(inputs), inputs.values
+
+    def turn(role: str, why: str) -> None:
+        drafts[role].put("reverse", True, why)
+
+    rotation = next((r for r in ("rim_speed", "wheel_speed") if r in values), None)
+    turning = next((r for r in ("wheel_angle", "rim_speed", "wheel_speed") if r in drafts), "")
+    for key, roles in ((rotation, (turning,)), ("ground_speed", ("ground_speed", "position"))):
+        if key in values and np.nanmedian(values[key][driven]) < 0.0:
+            for role in {*roles} & drafts.keys():
+                turn(role, "it is negative in the log; forward is positive")
+    for role, why in _POSITIVE.items():
+        if role not in values or role not in drafts:
             continue
-        values = inputs.values[role]
-        driving = float(np.nanmedian(values[driven]))
+        driving = float(np.nanmedian(values[role][driven]))
         if role not in ("load", "sinkage"):
             driving -= np.nan_to_num(inputs.rest.get(role, (0.0, 0.0))[0])
-        scatter = float(np.nanstd(values[driven]))
-        if driving < -0.5 * scatter:
-            why = {"load": "a load is positive", "sinkage": "sinkage is positive"}.get(
-                role, "positive where it drives forward"
-            )
-            drafts[role].put("reverse", True, f"it is negative in the log; {why}")
-
-
-def sign_of_slip(drafts: dict[str, Draft], inputs: Inputs) -> None:
-    """Turn a slip that is below zero where the torque drives, as of logs that count braking up."""
-    if not {"slip", "torque"} <= inputs.values.keys() or "torque" not in drafts:
-        return
-    torque, slip = inputs.values["torque"], inputs.values["slip"]
-    sign = -1.0 if drafts["torque"].keys.get("reverse") else 1.0
-    size = float(np.nanpercentile(np.abs(torque), 90))
-    drives = (sign * torque > 0.5 * size) & np.isfinite(slip) & (slip != 0.0)
-    if drives.any() and float(np.mean(slip[drives] < 0.0)) > 0.9:
-        drafts["slip"].put("reverse", True, "it is negative in the log where the torque drives")
-
-
-def sign_of_pull(drafts: dict[str, Draft], inputs: Inputs) -> None:
-    """Turn a pull that falls where the torque, or the current of the motor, rises."""
+        if driving < -0.5 * float(np.nanstd(values[role][driven])):
+            turn(role, f"it is negative in the log; {why}")
+    if {"slip", "torque"} <= values.keys() and "torque" in drafts:
+        torque, slip = values["torque"], values["slip"]
+        sign = -1.0 if drafts["torque"].keys.get("reverse") else 1.0
+        size = float(np.nanpercentile(np.abs(torque), 90))
+        drives = (sign * torque > 0.5 * size) & np.isfinite(slip) & (slip != 0.0)
+        if drives.any() and float(np.mean(slip[drives] < 0.0)) > 0.9:
+            turn("slip", "it is negative in the log where the torque drives")
     known = driving_means(inputs)
     role = "torque" if "torque" in known else "motor_current"
-    if not {role, "drawbar_pull"} <= known.keys() & drafts.keys():
-        return
-    means = np.stack([known[role], known["drawbar_pull"]])
-    means = means[:, np.isfinite(means).all(axis=0)]
-    if means.shape[1] >= 6 and np.ptp(means, axis=1).min() > 0.0:
+    if {role, "drawbar_pull"} <= known.keys() & drafts.keys():
+        means = np.stack([known[role], known["drawbar_pull"]])
+        means = means[:, np.isfinite(means).all(axis=0)]
         sign = -1.0 if drafts[role].keys.get("reverse") else 1.0
-        if sign * float(np.corrcoef(*means)[0, 1]) < -0.8:
-            why = "it falls in the log where the torque rises"
-            drafts["drawbar_pull"].put("reverse", True, why)
+        varies = means.shape[1] >= 6 and np.ptp(means, axis=1).min() > 0.0
+        if varies and sign * float(np.corrcoef(*means)[0, 1]) < -0.8:
+            turn("drawbar_pull", "it falls in the log where the torque rises")
 
 
 def tares(drafts: dict[str, Draft], inputs: Inputs) -> None:
     """Tare what reads something before the wheel starts and should read zero there."""
     driven = moving(inputs)
-    for role in ZERO_AT_REST:
+    for role in ("torque", "motor_current", "drawbar_pull"):
         if role not in drafts or role not in inputs.rest or role not in inputs.values:
             continue
         mean, error = inputs.rest[role]
@@ -106,22 +99,19 @@ def far_sinkage(drafts: dict[str, Draft], inputs: Inputs, radius: float = 0.0) -
     """
     if "sinkage" not in drafts or "sinkage" not in inputs.values or "sinkage" not in inputs.rest:
         return
-    rest = inputs.rest["sinkage"][0]
+    rest, draft = inputs.rest["sinkage"][0], drafts["sinkage"]
     level = float(np.nanmedian(inputs.values["sinkage"][moving(inputs)]))
     if not math.isfinite(rest):
         return
-    draft = drafts["sinkage"]
-    turned = draft.keys.get("reverse", False)
     far = min(_FAR, _MOST_AT_REST * radius) if radius > 0.0 else _FAR
     falls = abs(level) < abs(rest) - _FALLS
     if abs(rest) < far and abs(level) < _FAR and not falls:
-        height = draft.column is not None and _HEIGHTS & {*words_of(draft.column.name)}
-        if height and not abs(rest) > _STANDS:
+        if says(draft.column.name, _HEIGHTS) and not abs(rest) > _STANDS:
             draft.comments["column"] = Marked(
                 "CHANGE: a height is a sinkage where its zero is the undisturbed surface; else add "
                 'tare = "rest" and bias = 0.01'
             )
-        elif abs(rest) > _STANDS and (rest < 0.0) == turned:
+        elif abs(rest) > _STANDS and (rest < 0.0) == draft.keys.get("reverse", False):
             draft.comments["column"] = (
                 f"it reads {1e3 * abs(rest):.3g} mm before the wheel starts; where that is "
                 'the zero of the sensor, and no sinkage, add tare = "rest" and bias = 0.01'
@@ -145,17 +135,15 @@ def lifted(drafts: dict[str, Draft], inputs: Inputs) -> None:
     values, shortest = inputs.values["load"][rest], round(0.4 / inputs.step)
     driving = float(np.nanmedian(inputs.values["load"][moving(inputs)]))
     first = float(np.nanmedian(values[:shortest])) if values.size >= shortest > 0 else math.nan
-    if not abs(first) < 0.6 * abs(driving):
+    if not _OFFSET < abs(first) / max(abs(driving), 1e-300) < 0.6:
         return
-    landed = np.abs(values - first) > 0.25 * abs(driving - first)
-    end = int(np.argmax(landed)) if landed.any() else values.size
-    if end < shortest:
-        return
-    start, stop = float(inputs.time[0]), float(inputs.time[0] + 0.8 * end * inputs.step)
-    if abs(first) > _OFFSET * abs(driving):
-        drafts["load"].put(
-            "tare", [round(start, 2), round(stop, 2)], Marked(
-                f"CHANGE: from, until, s; it reads {first:.3g} there and {driving:.3g} while "
-                "driving: right if the wheel was above the ground"
-            ),
-        )  # fmt: skip
+    landed = np.flatnonzero(np.abs(values - first) > 0.25 * abs(driving - first))
+    end = int(landed[0]) if landed.size else values.size
+    if end >= shortest:
+        start = float(inputs.time[0])
+        why = (
+            f"CHANGE: from, until, s; it reads {first:.3g} there and {driving:.3g} while driving: "
+            "right if the wheel was above the ground"
+        )
+        stretch = [round(start, 2), round(start + 0.8 * end * inputs.step, 2)]
+        drafts["load"].put("tare", stretch, Marked(why))

@@ -20,7 +20,7 @@ from soilml.log_import.recording import Recording
 #: Ending -> module and function; any other ending is read as text.
 _READERS = {
     ".parquet": ("parquet_log", "read_parquet_log"),
-    **dict.fromkeys(ENDINGS, ("spreadsheet_log", "read_spreadsheet_log")),
+    **dict.fromkeys(ENDINGS, ("delimited_text", "read_spreadsheet_log")),
     ".mat": ("matlab", "read_matlab"),
     ".h5": ("matlab", "read_matlab"),
     ".hdf5": ("matlab", "read_matlab"),
@@ -30,7 +30,7 @@ _READERS = {
     ".mcap": ("bags", "read_bag"),
     ".bag": ("bags", "read_bag"),
 }
-_LONG = ("delimited_text", "bags")  # Modules whose readers show their progress
+_LONG = ("read_delimited_text", "read_bag")  # Readers that show their progress
 #: What to do with files of other kinds, by their ending.
 _OTHERS = {
     **dict.fromkeys((".xls", ".xlsb", ".ods"), "is a spreadsheet; save it as .xlsx"),
@@ -71,7 +71,7 @@ def read_log(path: str | Path, progress: Callable[[int], None] | None = None) ->
     module, function = _READERS.get(suffix, ("delimited_text", "read_delimited_text"))
     found = import_module(f"soilml.log_import.readers.{module}")
     read: Callable[..., list[Recording]] = getattr(found, function)
-    told = (progress,) if module in _LONG else ()
+    told = (progress,) if function in _LONG else ()
     try:
         refuse_device(file)
         beside = side_lines(file)

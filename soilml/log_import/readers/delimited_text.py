@@ -5,34 +5,34 @@ from __future__ import annotations
 import csv
 import datetime
 import re
+from collections import Counter
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
-from soilml.io.bounds import LOG_BYTES, LOG_VALUES
+from soilml.io.bounds import KEPT_VALUES, LOG_BYTES, LOG_VALUES
 from soilml.io.cell_text import read_number, read_numbers
-from soilml.log_import.readers.program_heads import known_header, with_labview_head
-from soilml.log_import.readers.text_by_arrow import SMALLEST, read_by_arrow
+from soilml.io.csv_by_arrow import blocks_of_cells
+from soilml.io.spreadsheet import sheet_rows
+from soilml.log_import.readers.blocks_of_text import BLOCK, find_blocks
 from soilml.log_import.readers.text_layout import (
-    BLOCK,
     MISSING,
     TextLayout,
-    check_columns,
     decode_text,
-    find_blocks,
     find_layout,
     split_line,
 )
 from soilml.log_import.recording import Recording
 from soilml.remarks import Remark
 
-_HEAD = 1 << 15  # Bytes by which the layout of a long log is found
-#: Cells of a column looked at to tell text from numbers, and the share that must be numbers.
-_LOOKED, _NUMBERS = 300, 0.5
+#: Bytes from which a log is read by pyarrow, and by which the layout of such a log is found.
+SMALLEST, _HEAD = 1 << 18, 1 << 15
+_NUMBERS = 0.5  # Share of the cells of a column that must be numbers
 _COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?", re.ASCII)
 _DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?", re.ASCII)
 #: A mark between thousands that is no decimal mark: a hard or thin space, an apostrophe.
@@ -40,6 +40,7 @@ _MARKS = "\u00a0\u202f\u2009'\u2019"
 _GROUPED = re.compile(rf"(?<=\d)[{_MARKS}](?=\d{{3}}(?!\d))", re.ASCII)
 _SPACED = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?", re.ASCII)
 _CLOCK = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:[.,]\d*)?)(?:\s*([AaPp][Mm]))?", re.ASCII)
+_DATES = ("%d-%m-%Y %H:%M:%S.%f", "%d-%m-%Y %H:%M:%S", "%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S")
 _MOST, _FEWEST = 200, 8  # Most signals, and fewest readings of each
 _CHANGES = 0.2  # Share of the lines at which the name changes; runs and states change seldom
 
@@ -69,45 +70,79 @@ def read_delimited_text(
     return recordings_of(path, text.splitlines(), notes)
 
 
+def read_spreadsheet_log(path: Path) -> list[Recording]:
+    """The table of a sheet (`BOOK.xlsx#SHEET`), whose header and units are found as those of a log.
+
+    Raises `InputError` where the sheet has no samples, and as `sheet_rows` does.
+    """
+    rows = sheet_rows(path)
+    width = max(map(len, rows), default=0)
+    # cells hold no tab; a quotation mark, as of inches, must not seem to open a quoted cell
+    lines = ["\t".join([*row, *[""] * (width - len(row))]).replace('"', "''") for row in rows]
+    return recordings_of(path, lines, ())
+
+
 def _plain_recording(path: Path, progress: Callable[[int], None] | None) -> Recording | None:
-    """A long log of plain cells, read in blocks; None for any other."""
+    """A long log of plain cells, by pyarrow in blocks; None for one that has to be read by lines.
+
+    It has to where a cell is no number, as in a second header. Of a log that holds more values than
+    memory has room for, one sample in some is read, evenly over the whole.
+    """
     with path.open("rb") as opened:
         data = opened.read(_HEAD).rpartition(b"\n")[0]
-    if any(mark in data for mark in (b'"', b"\r\r")) or data.count(b"\r") > data.count(b"\r\n"):
+    if b'"' in data or data.count(b"\r") > data.count(b"\r\n"):
         return None
     try:
-        text = data.decode("utf-8")
-    except UnicodeDecodeError:
-        return None
-    lines = text.removeprefix("\ufeff").splitlines()
-    check_columns(path, lines)
-    try:
-        layout = find_layout(lines)
-    except csv.Error:
+        lines = data.decode("utf-8-sig").splitlines()
+        layout = find_layout(path, lines)
+    except (UnicodeDecodeError, csv.Error):
         return None
     if layout is None or layout.separator == " ":
         return None
-    layout = with_labview_head(known_header(path, layout))
     samples, blocks = find_blocks(lines[layout.first :], layout)
     rows, bad = _rows(samples, layout)
     if bad or blocks or not rows:
         return None
-    _, texts = _columns([row for row, _ in rows], layout, as_time=False)
+    texts = _columns([row for row, _ in rows], layout, as_time=False)[1].keys()
     start = sum(len(line) for line in data.splitlines(keepends=True)[: layout.first])
-    usual = (len(data) - start) / len(rows)
-    found = read_by_arrow(path, start, layout, texts, usual, progress)
-    if found is None:
+    usual = (len(data) - start) / len(rows)  # bytes of a line
+    every = max(1, -int(-(path.stat().st_size - start) / usual * len(layout.names) // KEPT_VALUES))
+    found: dict[str, list[Any]] = {name: [] for name in layout.names}
+
+    def skipped(row: Any) -> str:
+        nonlocal bad
+        bad += 1
+        return "skip" if every > 1 else "error"
+
+    missing = {form for cell in MISSING for form in (cell, cell.upper(), cell.title(), "NaN")}
+    try:
+        with path.open("rb") as opened:
+            opened.seek(start)
+            decimal = "," if layout.decimal_comma else "."
+            first = 0
+            for batch in blocks_of_cells(
+                opened, layout.names, texts, layout.names, progress, missing=[*missing],
+                separator=layout.separator, decimal=decimal, bad_line=skipped,
+                skip_empty=True,
+            ):  # fmt: skip
+                for name in layout.names:
+                    cells = batch.column(name).to_numpy(zero_copy_only=False)
+                    found[name].append(cells[first::every].copy())  # else a view keeps all
+                first = (first - len(batch)) % every
+    except (ImportError, ValueError):  # pyarrow's own errors are kinds of `ValueError`
         return None
-    said = f"it is long: one sample in {found.every} is read, evenly over the whole"
-    notes = [Remark("thinned", said)] if found.every > 1 else []
+    said = f"it is long: one sample in {every} is read, evenly over the whole"
+    notes = [Remark("thinned", said)] if every > 1 else []
     columns, kept = {}, {}
-    for name in layout.names:
-        seconds = time_of_day(found.texts[name]) if name in found.texts else found.columns[name]
+    for name, parts in found.items():
+        joined = np.concatenate(parts)
+        own = [cell.strip() for cell in joined] if name in texts else []
+        seconds = time_of_day(own) if own else joined.astype(np.float64)
         if seconds is not None:
             columns[name] = seconds
         else:
-            kept[name] = found.texts[name]
-    return _recorded(path, layout, columns, kept, notes, found.bad)
+            kept[name] = own
+    return _recorded(path, layout, columns, kept, notes, bad)
 
 
 def _recorded(
@@ -132,9 +167,8 @@ def _recorded(
 def recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) -> list[Recording]:
     """The table of lines of text, with what its reader has found; raises as its caller does."""
     notes = list(found)
-    check_columns(path, lines)
     try:
-        layout = find_layout(lines)
+        layout = find_layout(path, lines)
     except csv.Error as error:
         raise InputError(
             f"{path} {error}; needed is a table, with the names of its columns above the samples"
@@ -144,15 +178,13 @@ def recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) -> 
             f"{path}: no line of this file looks like samples; needed is a table of numbers, one "
             "sample a line, separated by comma, semicolon, tab or spaces"
         )
-    layout = with_labview_head(known_header(path, layout))
     LOG_VALUES.check(path, len(lines) * len(layout.names))
     samples, blocks = find_blocks(lines[layout.first :], layout)
     rows, bad = _rows(samples, layout)
+    columns, texts = _columns([row for row, _ in rows], layout)
     if blocks:
         said = f"the header stands {len(set(blocks))} times: a run below each ({BLOCK!r})"
         notes.append(Remark("blocks", said, (BLOCK,), "note"))
-    columns, texts = _columns([row for row, _ in rows], layout)
-    if blocks:
         texts[BLOCK] = [blocks[i] for _, i in rows]
     return signals_of(_recorded(path, layout, columns, texts, notes, bad))
 
@@ -161,25 +193,17 @@ def _rows(lines: list[str], layout: TextLayout) -> tuple[list[tuple[list[str], i
     """The cells of all samples with the index of their line, and how many lines are left out."""
     width, bad = len(layout.names), 0
     rows: list[tuple[list[str], int]] = []
-    quoted = '"' in "".join(lines[:50])
-    simple = layout.separator != " " and not quoted
+    simple = layout.separator != " " and '"' not in "".join(lines[:50])
     for i, line in enumerate(lines):
         try:
             cells = line.split(layout.separator) if simple else split_line(line, layout.separator)
         except csv.Error:
+            cells = []
+        short = len(cells) < max(2, width / 2) < width
+        if short or any(cell.strip() for cell in cells[width:]):
             bad += 1
-            continue
-        if len(cells) < width:
-            if len(cells) < max(2, width / 2) < width:
-                bad += 1
-                continue
-            cells += [""] * (width - len(cells))
-        elif len(cells) > width:
-            if any(cell.strip() for cell in cells[width:]):
-                bad += 1
-                continue
-            cells = cells[:width]
-        rows.append((cells, i))
+        else:
+            rows.append(((cells + [""] * (width - len(cells)))[:width], i))
     return rows, bad
 
 
@@ -194,9 +218,7 @@ def _columns(
         present = sum(cell.strip().lower() not in MISSING for cell in cells)
         if present == 0 or numbers >= _NUMBERS * present:
             columns[name] = values
-            continue
-        seconds = time_of_day(cells) if as_time else None
-        if seconds is not None:
+        elif as_time and (seconds := time_of_day(cells)) is not None:
             columns[name] = seconds
         else:
             texts[name] = [cell.strip().strip('"') for cell in cells]
@@ -237,46 +259,36 @@ def _number(cell: str) -> float:
 
 def time_of_day(cells: list[str]) -> Floats | None:
     """Dates and times of day as seconds; None for other text. Midnight is passed once a day."""
-    shown = [cell.strip().strip('"') for cell in cells[:_LOOKED] if cell.strip()]
-    if not shown:
-        return None
+    own = [cell.strip().strip('"') for cell in cells]
+    shown = [cell for cell in own if cell][:20]
     for parse in (_iso_seconds, _clock_seconds):
-        if all(np.isfinite(parse(cell)) for cell in shown[:20]):
-            return _seconds(cells, parse)
+        if shown and all(np.isfinite(parse(cell)) for cell in shown):
+            values = np.array([parse(cell) for cell in own], dtype=np.float64)
+            if parse is _clock_seconds:
+                known = np.flatnonzero(np.isfinite(values))
+                days = np.cumsum(np.diff(values[known], prepend=values[known[0]]) < -43200.0)
+                values[known] += 86400.0 * days
+            return values
     return None
-
-
-def _seconds(cells: list[str], parse: Callable[[str], float]) -> Floats:
-    values = np.array([parse(cell.strip().strip('"')) for cell in cells], dtype=np.float64)
-    if parse is _clock_seconds:
-        known = np.flatnonzero(np.isfinite(values))
-        days = np.cumsum(np.diff(values[known], prepend=values[known[0]]) < -43200.0)
-        values[known] += 86400.0 * days
-    return values
 
 
 def _iso_seconds(cell: str) -> float:
     text = cell.replace("Z", "+00:00").replace("/", "-")
-    if not text.isascii():
-        return float("nan")
-    if len(text) < 10 or not text[:4].isdigit():
-        for form in ("%d-%m-%Y %H:%M:%S.%f", "%d-%m-%Y %H:%M:%S", "%d.%m.%Y %H:%M:%S.%f",
-                     "%d.%m.%Y %H:%M:%S"):  # fmt: skip
-            try:
-                when = datetime.datetime.strptime(text.replace(",", "."), form)
-            except ValueError:
-                continue
-            return when.replace(tzinfo=datetime.UTC).timestamp()
-        return float("nan")
     if match := re.fullmatch(r"(.*\.\d{6})\d+(.*)", text):
         text = match[1] + match[2]  # nanoseconds
-    try:
-        when = datetime.datetime.fromisoformat(text)
-    except ValueError:
+    if not text.isascii():
         return float("nan")
-    if when.tzinfo is None:
-        when = when.replace(tzinfo=datetime.UTC)
-    return when.timestamp()
+    iso = len(text) >= 10 and text[:4].isdigit()
+    for form in ("",) if iso else _DATES:
+        try:
+            if iso:
+                when = datetime.datetime.fromisoformat(text)
+            else:
+                when = datetime.datetime.strptime(text.replace(",", "."), form)
+        except ValueError:
+            continue
+        return (when if when.tzinfo else when.replace(tzinfo=datetime.UTC)).timestamp()
+    return float("nan")
 
 
 def _clock_seconds(cell: str) -> float:
@@ -324,9 +336,7 @@ def signals_of(recording: Recording) -> list[Recording]:
 
 
 def _is_signal(cells: list[str]) -> bool:
-    counts: dict[str, int] = {}
-    for cell in cells:
-        counts[cell] = counts.get(cell, 0) + 1
+    counts = Counter(cells)
     if not 1 < len(counts) <= _MOST or min(counts.values()) < _FEWEST or "" in counts:
         return False
     changes = sum(a != b for a, b in pairwise(cells))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.log_import.recording import Recording
@@ -22,52 +21,36 @@ def without_codes(recording: Recording) -> Recording:
     """The recording with NaN where a column has the code of a missing reading or a huge number, and
     where its clock has a huge one; a note says it.
     """
-    columns, notes = dict(recording.columns), list(recording.notes)
-    clock = recording.clock
-    if clock is not None and (huge := _huge(clock)).any():
-        clock = np.where(huge, np.nan, clock)
-        notes.append(_note("the clock", huge))
-    for name, given in recording.columns.items():
-        values = given
-        if (huge := _huge(values)).any():
-            columns[name] = values = np.where(huge, np.nan, values)
-            notes.append(_note(name, huge))
-        code = _code_of(values)
-        if code is not None:
+    notes = list(recording.notes)
+
+    def known(name: str, values: Floats, with_code: bool = True) -> Floats:
+        if (huge := np.abs(values) >= _HUGE).any():
+            text = f"{name}: {int(huge.sum())} numbers of {_HUGE:g} or more are no readings"
+            notes.append(Remark("huge-numbers", text, (name,)))
+            values = np.where(huge, np.nan, values)
+        if with_code and (code := _code_of(values)) is not None:
             found = values == code
-            columns[name] = np.where(found, np.nan, values)
             text = f"{name}: {code:g} is no reading, and left out {int(found.sum())} times"
             notes.append(Remark("missing-code", text, (name,)))
-    if len(notes) == len(recording.notes):
-        return recording
+            values = np.where(found, np.nan, values)
+        return values
+
+    clock = recording.clock
+    if clock is not None:
+        clock = known("the clock", clock, with_code=False)
+    columns = {name: known(name, values) for name, values in recording.columns.items()}
     return replace(recording, columns=columns, clock=clock, notes=tuple(notes))
-
-
-def _huge(values: Floats) -> NDArray[np.bool_]:
-    return np.asarray(np.abs(values) >= _HUGE)
-
-
-def _note(name: str, left_out: NDArray[np.bool_]) -> Remark:
-    text = f"{name}: {int(left_out.sum())} numbers of {_HUGE:g} or more are no readings"
-    return Remark("huge-numbers", text, (name,))
 
 
 def _code_of(values: Floats) -> float | None:
     """The code of a missing reading in a column; None where it has none."""
     known = values[np.isfinite(values)]
-    if known.size < _LEAST:
-        return None
-    for end in (float(known.min()), float(known.max())):
+    for end in (float(known.min()), float(known.max())) if known.size >= _LEAST else ():
         rest = known[known != end]
-        if rest.size == 0 or known.size - rest.size < _LEAST or not _looks_like_code(end):
-            continue
-        low, high = float(rest.min()), float(rest.max())
-        if max(low - end, end - high) > _RANGES * (high - low):
-            return end
+        digits = f"{abs(end):.10g}".replace(".", "")
+        is_code = (len(digits) >= 3 and {*digits} == {"9"}) or end in _ENDS
+        if is_code and rest.size and known.size - rest.size >= _LEAST:
+            low, high = float(rest.min()), float(rest.max())
+            if max(low - end, end - high) > _RANGES * (high - low):
+                return end
     return None
-
-
-def _looks_like_code(value: float) -> bool:
-    digits = f"{abs(value):.10g}".replace(".", "")
-    nines = len(digits) >= 3 and set(digits) == {"9"}
-    return nines or value in _ENDS

@@ -1,4 +1,4 @@
-"""The layout of a text log: encoding, separator, header, units, blocks, where samples begin."""
+"""The layout of a text log: encoding, separator, header, units, where samples begin."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from soilml.errors import InputError
 from soilml.io.bounds import COLUMNS
+from soilml.io.cell_text import read_number
 from soilml.log_import.units import known_unit
 
 _MARKS = (
@@ -19,8 +21,6 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-#: Share of zero bytes at odd or even places from which text counts as UTF-16 without a mark.
-_ZERO_SHARE = 0.3
 #: Bytes above ASCII in a row, and the share of those in pairs or more that says Chinese.
 _HIGH, _PAIRED = re.compile(rb"[\x80-\xff]+"), 0.8
 #: Cells that stand for a missing number.
@@ -52,39 +52,36 @@ _UNITS_FOLLOW = re.compile(r"^(units?|einheit(en)?|unidades|unités?)\s*[:=]\s*"
 _SEPARATORS = (";", "\t", ",", "|")
 #: Lines looked at, and how many of them must follow each other like samples.
 _LOOKED, _IN_A_ROW = 400, 3
-BLOCK = "block"  # Name of the column that distinguishes the blocks
-_SHORTEST, _MOST = 20, 1000  # Fewest samples of a block, and most blocks
+#: Files that a program writes without a header: name of the file -> columns with their units.
+#: DBP.dat is of the drawbar-pull rig in Chrono::Vehicle's co-simulation (OutputData of
+#: ChVehicleCosimWheeledMBSNode.cpp), whose slip is 1 - v/(r omega).
+_HEADERS: dict[str, tuple[tuple[str, str], ...]] = {
+    "DBP.dat": (
+        ("time", "s"), ("lin_vel", "m/s"), ("ang_vel", "rad/s"), ("slip", "1"),
+        ("slip_filtered", "1"), ("DBP", "N"), ("DBP_filtered", ""),
+    ),
+}  # fmt: skip
 
 
 def decode_text(data: bytes, file: Path) -> tuple[str, str]:
-    """The text and its encoding: UTF-8, UTF-16 with or without a mark, GB 18030 or Windows-1252.
+    """The text and its encoding: UTF-8, UTF-16 with its mark, GB 18030 or Windows-1252.
 
     Raises `InputError` for a file that is not text.
     """
     for mark, name in _MARKS:
         if data.startswith(mark):
             return data.decode(name, errors="replace"), name
-    head = data[:4096]
-    for first, name in ((1, "utf-16-le"), (0, "utf-16-be")):
-        part = head[first::2]
-        if part and part.count(0) > _ZERO_SHARE * len(part):
-            return data.decode(name, errors="replace"), name
-    if b"\0" in head:
+    if b"\0" in data[:4096]:
         raise InputError(
             f"{file} is not a text file, and its name has no ending of another format; known are "
             ".csv, .txt, .tsv, .dat, .json, .parquet, .mat, .h5, .mcap and .bag"
         )
-    try:
-        return data.decode("utf-8"), "utf-8"
-    except UnicodeDecodeError:
-        pass
     # letters with accents stand alone among ASCII, Chinese characters are two bytes each
-    runs = _HIGH.findall(data)
-    if sum(len(run) for run in runs if len(run) >= 2) > _PAIRED * sum(map(len, runs)):
-        try:
-            return data.decode("gb18030"), "gb18030"
-        except UnicodeDecodeError:
-            pass
+    runs = [len(run) for run in _HIGH.findall(data)]
+    chinese = sum(size for size in runs if size >= 2) > _PAIRED * sum(runs)
+    for name in ("utf-8", *(["gb18030"] if chinese else [])):
+        with suppress(UnicodeDecodeError):
+            return data.decode(name), name
     return data.decode("cp1252", errors="replace"), "cp1252"
 
 
@@ -107,12 +104,15 @@ class TextLayout:
     about: tuple[str, ...]
 
 
-def find_layout(lines: Sequence[str]) -> TextLayout | None:
+def find_layout(file: Path, lines: Sequence[str]) -> TextLayout | None:
     """The layout of the lines of a text file; None where nothing in it looks like samples.
 
-    Raises `csv.Error`, with the line, for a line before the samples that has no cells.
+    Raises `InputError` for more columns than a log may have, before any cell is looked at;
+    `csv.Error`, with the line, for a line before the samples that has no cells.
     """
     head = list(lines[:_LOOKED])
+    for line in head:
+        COLUMNS.check(file, max(len(line.split()), *(line.count(s) + 1 for s in _SEPARATORS)))
     text = "".join(head)
     possible = [s for s in _SEPARATORS if text.count(s) >= _IN_A_ROW]
     found = [(s, d, *_samples(head, s, d)) for s in (*possible, " ") for d in (False, True)]
@@ -123,16 +123,36 @@ def find_layout(lines: Sequence[str]) -> TextLayout | None:
     best = max(found, key=lambda f: (f[3] * min(f[4], 3), f[4], _numbers(head[f[2] :], f[0], f[1])))
     separator, comma, first, _, width = best
     names, units, header = _header(head[:first], separator, width)
-    about = tuple(_plain(line) for line in head[:header] if _plain(line))
-    return TextLayout(
-        separator=separator, decimal_comma=comma, names=names, units=units, first=first, about=about
-    )
+    known = _HEADERS.get(file.name, ())
+    if header == first and len(known) == width:  # a file without a header
+        names, units = zip(*known, strict=True)
+    about = tuple(plain for line in head[:header] if (plain := _uncommented(line)))
+    return _with_labview_head(TextLayout(separator, comma, names, units, first, about))
 
 
-def check_columns(file: Path, lines: Sequence[str]) -> None:
-    """Raise `InputError` for more columns than a log may have, before any cell is looked at."""
-    for line in lines[:_LOOKED]:
-        COLUMNS.check(file, max(len(line.split()), *(line.count(s) + 1 for s in _SEPARATORS)))
+def _with_labview_head(layout: TextLayout) -> TextLayout:
+    """The layout with the units, and the rate where there is no clock, of the head of a .lvm file.
+
+    Of signals with one clock, or none: the first column is `X_Value`, the last one `Comment`.
+    """
+    said = {}
+    for line in layout.about:
+        key, *cells = (cell.strip() for cell in line.split(layout.separator))
+        said[key] = [cell for cell in cells if cell]
+    if not {"Writer_Version", "Multi_Headings"} <= said.keys():
+        return layout
+    labels = said.get("Y_Unit_Label", [])
+    signals = [n for n in layout.names if not n.startswith(("X_Value", "Comment"))]
+    own = dict(zip(signals, labels, strict=True)) if len(labels) == len(signals) else {}
+    own |= {"X_Value": "s"} if said.get("X_Dimension") == ["Time"] else {}
+    own = {name: unit for name, unit in own.items() if known_unit(unit)}
+    units = [u or own.get(n, "") for n, u in zip(layout.names, layout.units, strict=True)]
+    about = layout.about
+    with suppress(ValueError, IndexError):
+        step = read_number(said.get("Delta_X", ["0"])[0].replace(",", "."))
+        if said.get("X_Columns") == ["No"] and step > 0.0:
+            about = (*about, f"rate: {1.0 / step:g} Hz")
+    return replace(layout, units=tuple(units), about=about)
 
 
 def split_line(line: str, separator: str) -> list[str]:
@@ -141,6 +161,14 @@ def split_line(line: str, separator: str) -> list[str]:
         return line.split()
     cells = next(csv.reader([line], delimiter=separator), [])
     return [cell.strip() for cell in cells]
+
+
+def cells_of(line: str, separator: str) -> list[str]:
+    """The cells of a line; none where it cannot be divided, as damaged samples."""
+    try:
+        return split_line(line, separator)
+    except csv.Error:
+        return []
 
 
 def is_number(cell: str, decimal_comma: bool = False) -> bool:
@@ -158,8 +186,8 @@ def is_number(cell: str, decimal_comma: bool = False) -> bool:
 def name_and_unit(cell: str) -> tuple[str, str]:
     """Name and unit of a header such as `Fz [N]` or `speed (mm/s)`; the unit is "" without one."""
     for pattern in (_OVER_UNIT, _OVER_UNIT_CLOSE):
-        if (match := pattern.match(cell)) and known_unit(_bare(match[2])):
-            return match[1].strip(), _bare(match[2])
+        if (match := pattern.match(cell)) and known_unit(unit := match[2].strip("[](){} ")):
+            return match[1].strip(), unit
     match = _BRACKETS.match(cell)
     if match and match[1].strip():
         return _unit_and_remark(match[1].strip(), match[2].strip())
@@ -192,37 +220,25 @@ def _samples(head: list[str], separator: str, comma: bool) -> tuple[int, int, in
     """Index of the first sample, how many lines look like it, and their number of cells."""
     kinds: list[int] = []
     for line in head:
-        if line.lstrip().startswith(COMMENTS) or not line.strip():
-            kinds.append(0)
-            continue
-        try:
-            cells = split_line(line, separator)
-        except csv.Error:
-            kinds.append(0)
-            continue
+        cells = [] if line.lstrip().startswith(COMMENTS) else cells_of(line, separator)
         numbers = sum(bool(c) and is_number(c, comma) for c in cells)
-        blanks = sum(not c for c in cells)
         # names of runs and times of day stand beside the numbers
-        kinds.append(len(cells) if numbers >= max(1, (len(cells) - blanks) / 2) else 0)
+        kinds.append(len(cells) if numbers >= max(1, sum(map(bool, cells)) / 2) else 0)
     widths = Counter(k for k in kinds if k)
     if not widths:
         return 0, 0, 0
     width = max(widths, key=lambda w: (widths[w], w))
     like = [abs(k - width) <= width // 4 and k > 0 for k in kinds]
     for i in range(len(like)):
-        run = like[i : i + _IN_A_ROW]
-        if all(run):
+        if all(like[i : i + _IN_A_ROW]):
             return i, sum(like[i:]), max(k for k, fits in zip(kinds, like, strict=True) if fits)
     return 0, 0, 0
 
 
 def _numbers(lines: list[str], separator: str, comma: bool) -> int:
     """How many cells are numbers: of two decimal marks, that of a few columns decides."""
-    try:
-        rows = [split_line(line, separator) for line in lines if line.strip()]
-    except csv.Error:
-        return 0
-    return sum(bool(cell) and is_number(cell, comma) for row in rows for cell in row)
+    cells = (cell for line in lines for cell in cells_of(line, separator) if cell)
+    return sum(is_number(cell, comma) for cell in cells)
 
 
 def _header(
@@ -231,9 +247,7 @@ def _header(
     """Names, units and the index of the header line, among the lines before the samples."""
     rows, said = [], None
     for i, line in enumerate(head):
-        text = line.strip()
-        for mark in COMMENTS:
-            text = text.removeprefix(mark).strip() if text.startswith(mark) else text
+        text = _uncommented(line)
         try:
             cells = _header_cells(_UNITS_FOLLOW.sub("", text), separator, width)
         except csv.Error as error:
@@ -305,72 +319,8 @@ def _are_units(cells: list[str]) -> bool:
     return bool(texts) and sum(known_unit(text) for text in texts) > len(texts) / 2
 
 
-def _bare(unit: str) -> str:
-    return unit.strip().strip("[](){}").strip()
-
-
-def _plain(line: str) -> str:
+def _uncommented(line: str) -> str:
     text = line.strip()
     for mark in COMMENTS:
-        text = text.removeprefix(mark)
-    return text.strip()
-
-
-def find_blocks(lines: Sequence[str], layout: TextLayout) -> tuple[list[str], list[str]]:
-    """The lines of samples (n,) of lines after the first header, and the name of their block (n,).
-
-    A new block begins where the header stands again. The line before it is its name, where these
-    lines differ; otherwise blocks are numbered. Names are empty where there is one block.
-    """
-    samples: list[str] = []
-    starts, titles = [0], [layout.about[-1] if layout.about else ""]
-    before = ""
-    for line in lines:
-        if not line or line.isspace():
-            continue
-        if _is_header(line, layout):
-            if len(samples) > starts[-1]:
-                starts.append(len(samples))
-                titles.append("")
-            titles[-1] = before or titles[-1]
-            before = ""
-            continue
-        if _is_title(line, layout):
-            before = line.strip().strip(layout.separator + "#%").strip()
-            continue
-        samples.append(line)
-    sizes = [b - a for a, b in zip(starts, [*starts[1:], len(samples)], strict=True)]
-    if not 1 < len(sizes) <= _MOST or min(sizes) < _SHORTEST:
-        return samples, []
-    if len(set(titles)) < len(titles) or not all(titles):
-        titles = [f"{i + 1:02d}" for i in range(len(sizes))]
-    return samples, [title for title, size in zip(titles, sizes, strict=True) for _ in range(size)]
-
-
-def _cells(line: str, layout: TextLayout) -> list[str]:
-    """The cells of a line; none where it cannot be divided, as damaged samples."""
-    try:
-        return split_line(line, layout.separator)
-    except csv.Error:
-        return []
-
-
-def _is_header(line: str, layout: TextLayout) -> bool:
-    """Whether a line has the names of the columns, or their units."""
-    first = line.lstrip()[:1]
-    if not (first.isalpha() or first in "#%\"'[(" or first == layout.separator):
-        return False
-    cells = [cell.strip("# %\"'") for cell in _cells(line, layout)]
-    known = [cell for cell in cells if cell]
-    if len(known) < max(2, len(layout.names) / 2):
-        return False
-    same = [any(name and cell.startswith(name.split("#")[0]) for name in layout.names)
-            for cell in known]  # fmt: skip
-    units = [cell.strip("[]()") in layout.units for cell in known]
-    return sum(same) > len(known) / 2 or sum(units) > len(known) / 2
-
-
-def _is_title(line: str, layout: TextLayout) -> bool:
-    """Whether a line has one text and no numbers beside it."""
-    cells = [cell for cell in _cells(line, layout) if cell]
-    return len(cells) == 1 < len(layout.names) and not is_number(cells[0], layout.decimal_comma)
+        text = text.removeprefix(mark).strip()
+    return text

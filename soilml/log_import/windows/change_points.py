@@ -45,13 +45,10 @@ def change_points(values: Floats, penalty: float, shortest: int = 1) -> list[int
         cost = best[starts] + fit + penalty
         previous[stop] = int(np.argmin(cost))
         best[stop] = cost[previous[stop]]
-    found = []
-    stop = n
-    while stop > 0:
-        stop = int(previous[stop])
-        if stop > 0:
-            found.append(stop)
-    return found[::-1]
+    found = [int(previous[n])]
+    while found[-1] > 0:
+        found.append(int(previous[found[-1]]))
+    return found[-2::-1]
 
 
 def steady_pieces(
@@ -77,18 +74,13 @@ def steady_pieces(
     penalty = _PENALTY * (channels + 2.0) * np.log(n) / sensitivity
     # channels of much long-run noise count less, instead of raising the penalty of all
     scaled = values / (unit * np.sqrt(long_run))
-    return _pieces(change_points(scaled, penalty, shortest), n)
+    return list(pairwise([0, *change_points(scaled, penalty, shortest), n]))
 
 
 def _noise(values: Floats) -> Floats:
     """Standard deviation of each channel (channels,) from the median of its differences."""
     steps = np.abs(np.diff(values, axis=0))
     return np.asarray(1.4826 * np.median(steps, axis=0) / np.sqrt(2.0))
-
-
-def _pieces(changes: list[int], n: int) -> list[tuple[int, int]]:
-    ends = [0, *changes, n]
-    return list(pairwise(ends))
 
 
 def without_transients(
@@ -111,12 +103,7 @@ def without_transients(
         values = quantities.get(name, np.zeros(0))
         if values.size != time.size:
             continue
-        means = np.asarray(
-            [
-                np.mean(part) if np.isfinite(part).all() else np.nan
-                for part in np.split(values[rows], edges[1:-1])
-            ]
-        )
+        means = np.asarray([part.mean() for part in np.split(values[rows], edges[1:-1])])
         middle = means[count // 4 : -count // 4]
         if np.isfinite(means).all() and np.ptp(middle) > 0.0:
             columns.append((means - middle.mean()) / middle.std())

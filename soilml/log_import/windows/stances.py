@@ -92,14 +92,6 @@ def _vertex(time: Floats, values: Floats, peak: int, half: int) -> float:
     return float(time[peak] + np.clip(-b / (2.0 * a) if a < 0.0 else 0.0, -limit, limit))
 
 
-def angle_of_midstances(time: Floats, middles: Floats, spacing: float) -> Floats:
-    """Angle (n,) from the first midstance, rad, linear between midstances; NaN outside of them."""
-    if middles.size < 2:
-        return np.full(time.size, np.nan)
-    turned = spacing * np.arange(middles.size)
-    return np.asarray(np.interp(time, middles, turned, left=np.nan, right=np.nan))
-
-
 def zero_of(time: Floats, angle: Floats, middles: Floats, spacing: float) -> float:
     """Angle at midstance, rad: the circular mean over a spacing of `angle` (n,) at `middles`."""
     known = np.isfinite(angle)

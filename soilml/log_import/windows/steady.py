@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,21 +66,12 @@ def steady_windows(
 def _joined(stretches: list[Stretch], settings: WindowSettings) -> list[Stretch]:
     """Stretches of which those that are too short, and follow each other, are one."""
     found: list[Stretch] = []
-    short: list[Stretch] = []
-    for stretch in [*stretches, None]:
-        if stretch is not None and stretch.why is not None and stretch.why.code == "too-short":
-            short.append(stretch)
-            continue
-        if len(short) < 3:
-            found += short
-        else:
-            text = (
-                f"nothing stays the same for {settings.shortest:g} s, as if someone had touched it"
-            )
-            why = Remark("nothing-steady", text)
-            found.append(Stretch(short[0].start, short[-1].stop, why))
-        short = []
-        found += [stretch] if stretch is not None else []
+    text = f"nothing stays the same for {settings.shortest:g} s, as if someone had touched it"
+    for is_short, group in groupby(stretches, lambda s: s.why and s.why.code == "too-short"):
+        own = list(group)
+        if is_short and len(own) >= 3:
+            own = [Stretch(own[0].start, own[-1].stop, Remark("nothing-steady", text))]
+        found += own
     return found
 
 
@@ -88,33 +79,15 @@ def _without(
     start: float, stop: float, settings: WindowSettings, left_out: tuple[LeaveOut, ...]
 ) -> list[tuple[float, float]]:
     """A piece without what the user leaves out; what is outside of `within` is kept apart."""
-    parts = [(start, stop)]
-    cuts = [(e.start, e.stop) for e in left_out]
-    low, high = settings.within
-    for edge in (low, high):
-        parts = [
-            piece
-            for a, b in parts
-            for piece in ([(a, edge), (edge, b)] if a < edge < b else [(a, b)])
-        ]
-    for a, b in cuts:
-        parts = [
-            piece
-            for p, q in parts
-            for piece in ((p, min(q, a)), (max(p, b), q))
-            if piece[0] < piece[1]
-        ]
+    edges = [start, *(edge for edge in settings.within if start < edge < stop), stop]
+    parts = list(pairwise(edges))
+    for cut in left_out:
+        halves = (
+            ((p, min(q, cut.start)) for p, q in parts),
+            ((max(p, cut.stop), q) for p, q in parts),
+        )
+        parts = sorted(piece for half in halves for piece in half if piece[0] < piece[1])
     return parts
-
-
-def _block_means(values: Floats, width: int, count: int) -> Floats:
-    """Means of `count` blocks of `width` samples, (count,), gaps interpolated."""
-    blocks = values[: width * count].reshape(count, width)
-    valid = np.isfinite(blocks)
-    sums = np.where(valid, blocks, 0.0).sum(axis=1)
-    means = np.where(valid.any(axis=1), sums / np.maximum(valid.sum(axis=1), 1), np.nan)
-    known = np.flatnonzero(np.isfinite(means))
-    return np.interp(np.arange(count), known, means[known])
 
 
 @dataclass(frozen=True)
@@ -129,16 +102,10 @@ class _Search:
     def step(self) -> float:
         return float(self.time[1] - self.time[0])
 
-    def watched(self) -> dict[str, Floats]:
-        """The quantities whose changes end a window."""
-        found = {
-            name: self.quantities[name]
-            for name in _WATCHED
-            if name in self.quantities and np.isfinite(self.quantities[name]).mean() > 0.1
-        }
-        if "rim_speed" in found and "speed" in found:
-            found.pop("slip", None)  # it follows from them, and is noise where the wheel rests
-        return found
+    def known(self, name: str, rows: NDArray[np.bool_] | slice = slice(None)) -> Floats | None:
+        """A quantity in some rows; None where it has no numbers there."""
+        values = self.quantities.get(name)
+        return None if values is None or not np.isfinite(values[rows]).any() else values[rows]
 
     def pieces(self, rows: NDArray[np.intp], sensitivity: float) -> list[tuple[float, float]]:
         """Pieces of a part of the run between change points, s, without the settling at its ends.
@@ -149,12 +116,19 @@ class _Search:
         width = max(1, round(max(_SHORTEST_MEAN, step * time.size / _MOST_VALUES) / step))
         count = max(1, time.size // width)
         columns, least = [], []
-        for name, values in self.watched().items():
-            means = _block_means(values[rows], width, count)
-            size = float(np.nanpercentile(np.abs(means), 90))
-            if size > 0.0:
-                columns.append(means)
-                least.append(_WATCHED[name] * size)
+        both = {"rim_speed", "speed"} <= self.quantities.keys()
+        for name, change in _WATCHED.items():
+            values = self.quantities.get(name, np.zeros(0))
+            # slip follows from two speeds, and is noise where the wheel rests
+            if values.size and np.isfinite(values).mean() > 0.1 and not (both and name == "slip"):
+                blocks = values[rows][: width * count].reshape(count, width)
+                valid = np.isfinite(blocks)
+                sums, sizes = np.where(valid, blocks, 0.0).sum(axis=1), valid.sum(axis=1)
+                filled = np.flatnonzero(sizes)
+                means = np.interp(np.arange(count), filled, sums[filled] / sizes[filled])
+                if (size := float(np.nanpercentile(np.abs(means), 90))) > 0.0:
+                    columns.append(means)
+                    least.append(change * size)
         if not columns:
             return [(float(time[0]), float(time[-1]))]
         shortest = max(1, round(0.25 * settings.shortest / (width * step)))
@@ -197,20 +171,17 @@ class _Search:
             return Remark("too-short", text, severity="note")
         if not rows.any():
             return Remark("no-samples", "there are no samples")
-        for name in ("slip", "load"):
-            if name in self.quantities:
-                missing = np.mean(~np.isfinite(self.quantities[name][rows]))
-                if missing > _MISSING:
-                    text = f"{missing:.0%} of the {name} is missing"
-                    return Remark("missing-samples", text, (name,))
+        for name in (name for name in ("slip", "load") if name in self.quantities):
+            missing = np.mean(~np.isfinite(self.quantities[name][rows]))
+            if missing > _MISSING:
+                return Remark("missing-samples", f"{missing:.0%} of the {name} is missing", (name,))
         return self.drift(rows)
 
     def drift(self, rows: NDArray[np.bool_]) -> Remark | None:
         """Which quantity changes within a window by more than it may; None where none does."""
         for name in ("slip", "torque"):
-            if name not in self.quantities or not np.isfinite(self.quantities[name][rows]).any():
+            if (values := self.known(name, rows)) is None:
                 continue
-            values = self.quantities[name][rows]
             third = len(values) // 3
             first, last = (mean_error(v, self.step) for v in (values[:third], values[-third:]))
             change, error = abs(last[0] - first[0]), float(np.hypot(first[1], last[1]))
@@ -244,23 +215,17 @@ class _Search:
         if torque is None or not np.isfinite(torque[rows]).any():
             return None
         near_zero = _AT_REST * float(np.nanpercentile(np.abs(torque), 90))
-        above = float(np.nanmedian(np.abs(torque[rows]))) >= near_zero
-        if above or self.slips(rows, near_zero):
+        if float(np.nanmedian(np.abs(torque[rows]))) >= near_zero:
             return None
+        # where a wheel begins to brake, slip varies little and is not that of the rest before
+        first = slice(0, max(3, round(_FIRST / self.step)))
+        slip, before = self.known("slip", rows), self.known("slip", first)
+        rested = self.known("torque", first)
+        if slip is not None and before is not None and rested is not None:
+            middle = float(np.nanmedian(slip))
+            other = abs(middle - float(np.nanmedian(before))) > _OTHER_SLIP
+            steady = float(np.nanstd(slip)) < 0.5 * abs(middle)
+            if steady and other and abs(np.nanmedian(rested)) < near_zero:
+                return None
         text = "the torque is near zero: the wheel is probably at rest"
         return Remark("torque-near-zero", text, ("torque",))
-
-    def slips(self, rows: NDArray[np.bool_], near_zero: float) -> bool:
-        """Whether a window without torque has a slip of its own: where a wheel begins to brake.
-
-        It is one that varies little and is not that of the rest with which the log begins.
-        """
-        slip, torque = self.quantities.get("slip"), self.quantities["torque"]
-        first = max(3, round(_FIRST / self.step))
-        if slip is None or not (np.isfinite(slip[:first]).any() and np.isfinite(slip[rows]).any()):
-            return False
-        middle = float(np.nanmedian(slip[rows]))
-        steady = float(np.nanstd(slip[rows])) < 0.5 * abs(middle)
-        rests = np.isfinite(torque[:first]).any() and abs(np.nanmedian(torque[:first])) < near_zero
-        other = abs(middle - float(np.nanmedian(slip[:first]))) > _OTHER_SLIP
-        return bool(steady and rests and other)

@@ -1,24 +1,148 @@
-"""Drawbar pull against slip, and the steepest slope, predicted before the climb."""
+"""Stress on a rim against slip, and the pull and steepest slope of a rover that follow from it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from soilml.arrays import Floats, Real
-from soilml.errors import FitError, InputError
-from soilml.systems.rim_stress.climb import Rover, WheelRun
-from soilml.systems.rim_stress.climb_balances import wheel_components
+from soilml.errors import FitError
+from soilml.systems.rim_stress.climbs import Rover, WheelRun, count_apart, wheel_components
 from soilml.systems.rim_stress.force_balance import SlopePull
 from soilml.systems.rim_stress.ground import GroundEstimate
-from soilml.systems.rim_stress.stress_by_slip import StressBySlip
+from soilml.systems.rim_stress.stress import StressProfile
 
+POINTS = 41  # Points from exit to entry that represent the shape of a profile
+#: Slips closer than this count as one; highest degree of the polynomials in slip.
+MIN_SLIP_DIFFERENCE, MAX_DEGREE = 0.05, 3
+SAME_SIGMAS = 3.0  # Standard deviations within which two arcs count as equal
 #: Points of the curve over slip; resamples of the measured stress; soil samples taken with each
 #: resample. Forces are computed for all soils of a resample at once: 24 x 16 samples determine the
 #: ends of a 90 % interval to about 1.5 % of probability.
 CURVE_SLIPS, STRESS_RESAMPLES, SOILS_PER_RESAMPLE = 25, 24, 16
+
+
+@dataclass(frozen=True)
+class StressBySlip:
+    r"""Exit, entry and shape of the stressed arc as polynomials of slip.
+
+    Each profile is reduced to exit angle, entry angle and its shape at `POINTS` evenly spaced
+    points, scaled to mean 1. Each of these numbers is fitted by a polynomial in slip, whose degree
+    is the number of distinct slips less two, at least 1 and at most 3. Only the shape is kept,
+    because the load of the wheel determines the magnitude. Valid from `lowest` to `highest` slip.
+    References: Nagatani et al., section 5.2 and Figs. 5 and 7, which show that the stress at
+    artificial slip on level ground equals that on a slope at the same slip.
+    """
+
+    slip: Floats  # (profiles,)
+    fitted: Floats  # (profiles, 2 + POINTS)
+    residual: Floats  # (profiles, 2 + POINTS), scaled by the degrees of freedom
+    degree: int
+
+    @classmethod
+    def fit(cls, wheels: Sequence[WheelRun]) -> StressBySlip:
+        """Fit profiles at two distinct slips or more; raises `FitError` for fewer."""
+        slip = np.asarray([wheel.slip for wheel in wheels])
+        distinct = count_apart(slip, MIN_SLIP_DIFFERENCE)
+        if distinct < 2:
+            raise FitError(
+                f"stress at {distinct} slip{'s' if distinct != 1 else ''}; needed are two slips "
+                f"that differ by {MIN_SLIP_DIFFERENCE} or more, for example artificial slips"
+            )
+        numbers = np.stack([_reduce(wheel.profile) for wheel in wheels])
+        degree = int(np.clip(distinct - 2, 1, MAX_DEGREE))
+        own = cls(slip, numbers, numbers, degree)
+        fitted = own.numbers(slip)
+        freedom = max(len(slip) - degree - 1, 1)
+        return cls(slip, fitted, (numbers - fitted) * np.sqrt(len(slip) / freedom), degree)
+
+    @property
+    def lowest(self) -> float:
+        """The smallest slip at which stress was measured."""
+        return float(self.slip.min())
+
+    @property
+    def highest(self) -> float:
+        """The largest slip at which stress was measured."""
+        return float(self.slip.max())
+
+    def numbers(self, slips: Floats) -> Floats:
+        """Exit, entry and shape (n, 2 + POINTS) at slips (n,), by least squares."""
+        x = np.vander(self.slip, self.degree + 1)
+        found = np.linalg.lstsq(x, self.fitted, rcond=None)[0]
+        return np.asarray(np.vander(slips, self.degree + 1) @ found)
+
+    def profiles(self, slips: Floats) -> list[StressProfile]:
+        """The stress at slips (n,) within the range, of mean about 1 Pa."""
+        profiles = []
+        for numbers in self.numbers(slips):
+            normal = np.maximum(numbers[2:], 0.0)
+            normal[[0, -1]] = 0.0
+            ends = numbers[0], max(numbers[1], numbers[0] + 1e-3)
+            profiles.append(StressProfile(np.linspace(*ends, POINTS), normal))
+        return profiles
+
+    def resampled(self, rng: np.random.Generator) -> StressBySlip:
+        """The fit to one residual bootstrap sample of the profiles."""
+        chosen = rng.integers(len(self.slip), size=len(self.slip))
+        return replace(self, fitted=self.fitted + self.residual[chosen])
+
+
+def _reduce(profile: StressProfile) -> Floats:
+    """Exit, entry and shape (2 + POINTS,)."""
+    ends = profile.exit_angle, profile.entry_angle
+    shape = np.interp(np.linspace(*ends, POINTS), profile.angle, profile.normal)
+    return np.concatenate([ends, shape / shape.mean()])
+
+
+@dataclass(frozen=True)
+class StressComparison:
+    """Stressed arc on slopes less that at artificial slip on level ground, rad, and its std, (3,).
+
+    difference, std: Of exit angle, entry angle and centre of the stress; means over `runs` profiles
+        on slopes at slips within those on level ground.
+    """
+
+    difference: Floats
+    std: Floats
+    runs: int
+
+    @property
+    def equal(self) -> bool:
+        """Whether no difference exceeds three standard deviations."""
+        return bool((np.abs(self.difference) < SAME_SIGMAS * self.std).all())
+
+
+def compare_stress(
+    slopes: Sequence[WheelRun], level: Sequence[WheelRun]
+) -> StressComparison | None:
+    """Test whether stress at artificial slip on level ground equals that on slopes.
+
+    The scatter is that of the profiles on level ground about their polynomial in slip. None without
+    two slips on level ground, or without a slope within them. References: Nagatani et al., Fig. 7.
+    """
+    flat = np.asarray([wheel.slip for wheel in level])
+    within = [w for w in slopes if len(flat) and flat.min() <= w.slip <= flat.max()]
+    distinct = count_apart(flat, MIN_SLIP_DIFFERENCE)
+    if distinct < 2 or not within:
+        return None
+    degree = int(np.clip(distinct - 2, 1, MAX_DEGREE))
+    x = np.vander(flat, degree + 1)
+    y, own = (np.stack([_ends_and_centre(w.profile) for w in runs]) for runs in (level, within))
+    fit = np.linalg.lstsq(x, y, rcond=None)[0]
+    variance = ((y - x @ fit) ** 2).sum(axis=0) / max(len(x) - degree - 1, 1)
+    at = np.vander([w.slip for w in within], degree + 1)
+    mean = at.mean(axis=0)
+    share = 1.0 / len(within) + mean @ np.linalg.pinv(x.T @ x) @ mean
+    std = np.sqrt(variance * share)
+    return StressComparison((own - at @ fit).mean(axis=0), std, runs=len(within))
+
+
+def _ends_and_centre(profile: StressProfile) -> Floats:
+    centre = profile.angle @ profile.normal / profile.normal.sum()
+    return np.asarray([profile.exit_angle, profile.entry_angle, centre])
 
 
 @dataclass(frozen=True)
@@ -43,37 +167,6 @@ class ClimbingAbility:
     def fraction_still_rising(self) -> float:
         """Fraction of samples whose slope is largest at the highest slip, where the curve ends."""
         return float(np.mean(np.argmax(self.slope, axis=1) == len(self.slip) - 1))
-
-    def steepest_within(self, slip_limit: float) -> Floats:
-        """The steepest slope (rad) of each sample at slips up to a limit, (samples,).
-
-        Raises `InputError` for a limit outside the slips at which stress was measured.
-        """
-        check_slip(slip_limit, (float(self.slip[0]), float(self.slip[-1])))
-        at_limit = np.asarray([np.interp(slip_limit, self.slip, slope) for slope in self.slope])
-        below = np.where(self.slip <= slip_limit, self.slope, -np.inf).max(axis=1)
-        return np.asarray(np.maximum(at_limit, below))
-
-
-def shared_slips(front: StressBySlip, rear: StressBySlip) -> tuple[float, float]:
-    """Range of slips at which the stress of both wheels is known; raises `FitError` if empty."""
-    lowest, highest = max(front.lowest, rear.lowest), min(front.highest, rear.highest)
-    if not lowest < highest:
-        raise FitError(
-            f"stress was measured on the front wheel at slips {front.lowest:.3g} to "
-            f"{front.highest:.3g} and on the rear at {rear.lowest:.3g} to {rear.highest:.3g}; "
-            "the two ranges must overlap"
-        )
-    return lowest, highest
-
-
-def check_slip(limit: float, measured: tuple[float, float]) -> None:
-    """Raise `InputError` for a slip limit outside the slips at which stress was measured."""
-    if not measured[0] <= limit <= measured[1]:
-        raise InputError(
-            f"slip limit {limit:g}: stress was measured at slips from {measured[0]:.3g} to "
-            f"{measured[1]:.3g} only; there is no prediction outside"
-        )
 
 
 def climbing_ability(
@@ -115,7 +208,13 @@ def climbing_ability(
     >>> round(float(np.rad2deg(quantile_band(ability.steepest).middle)))  # true: 13.2
     13
     """
-    lowest, highest = shared_slips(front, rear)
+    lowest, highest = max(front.lowest, rear.lowest), min(front.highest, rear.highest)
+    if not lowest < highest:
+        raise FitError(
+            f"stress was measured on the front wheel at slips {front.lowest:.3g} to "
+            f"{front.highest:.3g} and on the rear at {rear.lowest:.3g} to {rear.highest:.3g}; "
+            "the two ranges must overlap"
+        )
     rng = np.random.default_rng(seed)
     slip = np.linspace(lowest, highest, CURVE_SLIPS)
     pull, slope = [], []
@@ -123,31 +222,29 @@ def climbing_ability(
         chosen = rng.integers(len(ground.samples_as_measured), size=SOILS_PER_RESAMPLE)
         soils = ground.samples_as_measured[chosen]
         load_factor = 1.0 + ground.noise.front_load * rng.normal(size=SOILS_PER_RESAMPLE)
-        # without a known centre of mass the weight is shared equally; at least 5 % on each axle
-        front_share = np.clip((ground.rover.front_share or 0.5) * load_factor, 0.05, 0.95)
+        front_share = np.clip(ground.rover.front_share * load_factor, 0.05, 0.95)
         profiles = [wheel.resampled(rng).profiles(slip) for wheel in (front, rear)]
-        by_slip = []
-        for s, *both in zip(slip, *profiles, strict=True):
-            wheels = [
-                wheel_components(WheelRun(float(s), profile), ground.rover, soils[:, 2])
-                for profile in both
+        pull_and_slope: Floats = np.asarray(  # (n, 2, SOILS_PER_RESAMPLE)
+            [
+                pull_and_slope_at(float(s), both, ground.rover, soils.T, front_share)
+                for s, *both in zip(slip, *profiles, strict=True)
             ]
-            forces = slope_pull(ground.rover, wheels, soils[:, 0], np.tan(soils[:, 1]), front_share)
-            by_slip.append((forces.pull(0.0), forces.equilibrium_slope()))
-        pull_and_slope: Floats = np.asarray(by_slip)  # (n, 2, SOILS_PER_RESAMPLE)
+        )
         pull.append(pull_and_slope[:, 0].T)
         slope.append(pull_and_slope[:, 1].T)
     return ClimbingAbility(slip=slip, pull=np.concatenate(pull), slope=np.concatenate(slope))
 
 
-def slope_pull(
+def pull_and_slope_at(
+    slip: float,
+    profiles: Sequence[StressProfile],
     rover: Rover,
-    wheels: Sequence[Floats],
-    cohesion: Real,
-    tangent: Real,
+    shear: Sequence[Real] | Floats,
     front_share: Real,
-) -> SlopePull:
-    r"""Drawbar pull of a rover whose wheels have one slip, as a function of the slope.
+) -> tuple[Real, Real]:
+    r"""Pull on level ground (N) and slope climbed (rad) of a rover whose wheels have one slip.
+
+    profiles: Of front and rear. shear: Cohesion (Pa), friction angle (rad) and k_x (m), (n,) each.
 
     Each wheel's ratio of pull to load on soil without cohesion is :math:`\rho`, the loads are
     :math:`a \cos\alpha - h \sin\alpha` and :math:`(1 - a) \cos\alpha + h \sin\alpha` times the
@@ -157,11 +254,20 @@ def slope_pull(
         F_x = m g [(a \rho_f + (1 - a) \rho_r) \cos\alpha + h (\rho_r - \rho_f) \sin\alpha]
               + 2 c \sum (C_x - \rho C_z)
     """
-    each = [SlopePull.of_wheel(parts, rover.weight, cohesion, tangent) for parts in wheels]
-    shares, height = (front_share, 1.0 - front_share), rover.height_ratio or 0.0
-    return SlopePull(
-        weight=rover.weight,
-        cos_term=sum(share * one.cos_term for share, one in zip(shares, each, strict=True)),
-        sin_term=height * (each[1].cos_term - each[0].cos_term),
-        constant=2.0 * sum(one.constant for one in each),
+    cohesion, friction, modulus = shear
+    front, rear = (
+        SlopePull.of_wheel(
+            wheel_components(WheelRun(slip, profile), rover, modulus),
+            rover.weight,
+            cohesion,
+            np.tan(friction),
+        )
+        for profile in profiles
     )
+    forces = SlopePull(
+        weight=rover.weight,
+        cos_term=front_share * front.cos_term + (1.0 - front_share) * rear.cos_term,
+        sin_term=rover.height_ratio * (rear.cos_term - front.cos_term),
+        constant=2.0 * (front.constant + rear.constant),
+    )
+    return forces.pull(0.0), forces.equilibrium_slope()

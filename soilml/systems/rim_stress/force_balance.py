@@ -16,7 +16,7 @@ from soilml.physics.gears.rigid_wheel import WheelArc
 from soilml.physics.gears.wheel import contact_at
 from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.remarks import Remark
-from soilml.systems.rim_stress.stress_profile import StressProfile
+from soilml.systems.rim_stress.stress import StressProfile
 
 LIFT, PULL, TORQUE = range(3)  # First axis of components: N, N and N m
 #: Range of k_x that is searched, m: shear mobilised at once, and hardly any in a wheel's contact;
@@ -127,6 +127,12 @@ def magnification(parts: Floats, load: Real, cohesion: Real, tangent: Real) -> R
         return np.asarray(left / force_of(parts, LIFT, 1.0, 0.0, tangent))
 
 
+def pull_ratio(parts: Floats, tangent: Real) -> Real:
+    """Pull over load on soil without cohesion."""
+    pull, lift = (force_of(parts, force, 1.0, 0.0, tangent) for force in (PULL, LIFT))
+    return np.asarray(pull / lift)
+
+
 def pull_under(parts: Floats, load: Real, cohesion: Real, tangent: Real) -> Real:
     """Drawbar pull (N) of a wheel that carries a load (N), at c (Pa) and tan(phi).
 
@@ -153,7 +159,7 @@ class SlopePull:
         M follows from the load: the pull is the ratio of pull to load without cohesion times the
         load, and what cohesion adds less the pull of the load that it carries instead.
         """
-        ratio = force_of(parts, PULL, 1.0, 0.0, tangent) / force_of(parts, LIFT, 1.0, 0.0, tangent)
+        ratio = pull_ratio(parts, tangent)
         of_cohesion = cohesion * (parts[PULL, 2] - ratio * parts[LIFT, 2])
         return SlopePull(weight, weight * ratio, 0.0, of_cohesion)
 

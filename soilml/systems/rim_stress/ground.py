@@ -11,25 +11,21 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.errors import FitError, InputError
 from soilml.fitting.misfit import misfit_limit
-from soilml.identification.fit import STRONG_CORRELATION, Fit, identifiability_remarks
+from soilml.identification.fit import Fit, identifiability_remarks, trade_offs
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.prior import Prior
 from soilml.quantities import QUANTITIES, SHEAR
 from soilml.remarks import Remark
-from soilml.systems.rim_stress.climb import (
+from soilml.systems.rim_stress.climbs import (
     Climb,
+    ForceBalances,
     Rover,
     ShearParameters,
     Uncertainty,
-    group_by_slope,
-)
-from soilml.systems.rim_stress.climb_balances import (
-    ForceBalances,
-    estimate_wheel_loads,
+    count_apart,
     wheel_components,
-    wheel_magnifications,
 )
-from soilml.systems.rim_stress.force_balance import unit_remarks
+from soilml.systems.rim_stress.force_balance import magnification, unit_remarks
 
 #: Priors of the shear parameters of sands, used where neither a value nor a range is given.
 DEFAULT_PRIORS = {
@@ -45,6 +41,9 @@ START_SOILS, SAMPLES, ITERATIONS = 2048, 6000, 2
 #: deviations, all climbs as contradictory if the noise would have to be this many times larger.
 MAX_MISS, MAX_NOISE_SCALE = 6.0, 5.0
 EDGE = 1e-6  # Distance of the corner soils from the edges of the unit cube
+#: Slopes that differ by less than this many standard deviations of a difference, or than about half
+#: a degree (rad), are one condition.
+SLOPE_SIGMAS, MIN_SLOPE_DIFFERENCE = 3.0, 0.009
 
 
 @dataclass(frozen=True)
@@ -58,12 +57,11 @@ class GroundEstimate:
     fit: Fit
     samples: Floats  # (n, 3): c (Pa), phi (rad), k_x (m); fixed parameters are constant
     samples_as_measured: Floats  # (n, 3)
-    rover: Rover  # with the loads of its wheels, known or estimated
+    rover: Rover
     noise: Uncertainty
     residual: Floats  # (climbs,) N, pull less the weight along the slope, at the posterior mean
     residual_std: Floats  # (climbs,) N
     distinct_slopes: int
-    magnification: Floats  # (climbs, 2), M of front and rear wheel at the posterior mean
 
     @property
     def shear(self) -> ShearParameters:
@@ -85,16 +83,15 @@ def identify_ground(
     .. math::
         2 (F_{xf} + F_{xr}) = m g \sin\alpha, \qquad 2 (F_{zf} + F_{zr}) = m g \cos\alpha
 
-    The second equation gives M of each run in closed form; the first is then one equation for each
-    run, weighted by the noise of its balance (`balance_std`). The posterior mean and covariance are
-    the estimate. Repeated climbs of one slope are one condition: p parameters need p slopes. Each
-    wheel has its own M only if the loads of the wheels are known; with the two sums alone each run
-    would add as many unknowns as equations.
+    The second equation gives M of each wheel in closed form; the first is then one equation for
+    each run, weighted by the noise of its balance (`balance_std`). The posterior mean and
+    covariance are the estimate. Repeated climbs of one slope are one condition: p parameters need p
+    slopes.
 
     Parameters
     ----------
     rover
-        Mass, wheels and, where known, the centre of mass.
+        Mass, wheels and centre of mass.
     climbs
         Steady climbs with slip and stress of both wheels.
     fixed
@@ -134,7 +131,8 @@ def identify_ground(
     if unknown := sorted((fixed.keys() | prior.keys()) - set(SHEAR)):
         raise InputError(f"no soil parameter {unknown[0]!r}; there are: {', '.join(SHEAR)}")
     ranges = {name: prior.get(name, DEFAULT_PRIORS[name]) for name in SHEAR if name not in fixed}
-    slopes = len(group_by_slope(climbs, noise.slope)) if climbs else 0
+    tolerance = max(SLOPE_SIGMAS * np.sqrt(2.0) * noise.slope_rad, MIN_SLOPE_DIFFERENCE)
+    slopes = count_apart([climb.slope for climb in climbs], float(tolerance))
     _refuse_too_few(slopes, list(ranges))
     constant = fixed.get("shear_modulus", 0.0)
     within = ranges.get("shear_modulus") or Prior(constant, constant)
@@ -183,7 +181,7 @@ def identify_ground(
         misfit = float(np.sum((whitener @ residual) ** 2)) / max(freedom, 1)
         noise_scale = float(np.sqrt(misfit)) if misfit > misfit_limit(max(freedom, 1)) else 1.0
     _refuse_contradiction(balances, residual, std, noise_scale)
-    as_measured, _ = balances.whitener(_shear(centre), replace(noise, entry_angle=0.0))
+    as_measured, _ = balances.whitener(_shear(centre), replace(noise, entry_angle_rad=0.0))
     samples = soils(u)
     fit = Fit(
         method="climbing",
@@ -197,16 +195,11 @@ def identify_ground(
         misfit=misfit,
         channels=("slope_rad",),
     )
-    cohesion, friction, modulus = shear = _shear(samples.mean(axis=0))
+    cohesion, friction, modulus = _shear(samples.mean(axis=0))
     scales = [
-        wheel_magnifications(
-            rover,
-            climb.slope,
-            [wheel_components(wheel, rover, modulus) for wheel in climb.wheels],
-            cohesion,
-            float(np.tan(friction)),
-        )
+        magnification(wheel_components(wheel, rover, modulus), load, cohesion, np.tan(friction))
         for climb in climbs
+        for wheel, load in zip(climb.wheels, rover.loads(climb.slope), strict=True)
     ]
     assumed = {name: ranges[name] for name in free if name not in prior}
     warnings = _warnings(fit, noise_scale, slopes, assumed) + unit_remarks(np.asarray(scales))
@@ -214,12 +207,11 @@ def identify_ground(
         fit=replace(fit, warnings=tuple(warnings)),
         samples=samples,
         samples_as_measured=soils(draw(as_measured / noise_scale)),
-        rover=estimate_wheel_loads(rover, climbs, shear),
+        rover=rover,
         noise=noise,
         residual=residual,
         residual_std=std,
         distinct_slopes=slopes,
-        magnification=np.asarray(scales),
     )
 
 
@@ -280,14 +272,7 @@ def _warnings(
         for name, left in fit.remaining_fraction.items()
         for remark in identifiability_remarks(name, left)
     ]
-    for i, a in enumerate(fit.names):
-        for j, b in enumerate(fit.names):
-            if i < j and abs(fit.correlation[i, j]) > STRONG_CORRELATION:
-                text = (
-                    f"{a} and {b} compensate each other (correlation {fit.correlation[i, j]:+.2f})"
-                    ": rely on the pull that follows from both, not on each value"
-                )
-                found.append(Remark("trade-off", text, (a, b)))
+    found += trade_offs(fit)
     if noise_scale > 1.0:
         text = (
             f"the residuals of the force balances are {noise_scale:.1f} times the noise; standard "

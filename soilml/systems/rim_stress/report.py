@@ -11,33 +11,24 @@ from soilml.arrays import Floats
 from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.quantities import SHEAR
 from soilml.remarks import Remark, about
-from soilml.report.figure_style import AFTER, BEFORE
+from soilml.report.column_figure import column_picture
 from soilml.report.numbers import format_band
-from soilml.report.report import Picture, Report
+from soilml.report.report import Report
 from soilml.report.tables import Column, ReportTable
 from soilml.systems.rim_stress.ability import (
     ClimbingAbility,
-    check_slip,
-    climbing_ability,
-    shared_slips,
-)
-from soilml.systems.rim_stress.climb import WHEELS
-from soilml.systems.rim_stress.climb_balances import modulus_per_climb
-from soilml.systems.rim_stress.ground import GroundEstimate, identify_ground
-from soilml.systems.rim_stress.rover_file import RoverFile
-from soilml.systems.rim_stress.stress_by_slip import (
     StressBySlip,
     StressComparison,
+    climbing_ability,
     compare_stress,
 )
+from soilml.systems.rim_stress.climbs import WHEELS, RoverFile, modulus_per_climb
+from soilml.systems.rim_stress.ground import GroundEstimate, identify_ground
 from soilml.systems.rim_stress.tables import ClimbData
 
 #: Fraction of samples whose slope still rises at the highest slip, above which a warning is given.
 MAX_STILL_RISING = 0.05
 ZERO_SLIP_SIGMAS = 2.0  # Slips within this many standard deviations of zero have no certain sign
-SLIP_MARGIN = 0.02  # Distance from the curve's range at which the slip of a climb counts as outside
-#: Relative error of the speeds assumed for the table of k_x by run, as in Fig. 9.
-SPEED_ERROR = 0.015
 SLIPS = 9  # Slips of the curve in its table
 
 
@@ -45,16 +36,15 @@ SLIPS = 9  # Slips of the curve in its table
 class ClimbingReport:
     """Soil, climbing ability, the shear modulus of each climb alone, and whether stresses agree.
 
-    modulus: k_x of each climb (m) by the error of the speed that is assumed.
+    modulus: k_x of each climb alone, m (climbs,).
     stress: By wheel, the arc on slopes less that at artificial slip; None where not measured.
     """
 
     ground: GroundEstimate
     ability: ClimbingAbility
     data: ClimbData
-    modulus: dict[float, Floats]
+    modulus: Floats
     stress: dict[str, StressComparison | None]
-    slip_limit: float | None
 
     @property
     def curve(self) -> dict[str, Any]:
@@ -77,47 +67,37 @@ class ClimbingReport:
             "slip_rear": [c.rear.slip for c in climbs],
             "off_N": self.ground.residual,
             "off_N_std": self.ground.residual_std,
-            "shear_modulus_m_if_speed_low": self.modulus[-SPEED_ERROR],
-            "shear_modulus_m": self.modulus[0.0],
-            "shear_modulus_m_if_speed_high": self.modulus[SPEED_ERROR],
+            "shear_modulus_m": self.modulus,
         }
 
     @property
     def warnings(self) -> tuple[Remark, ...]:
         """Limitations of the data and of the estimate."""
         warnings, noise = list(self.ground.fit.warnings), self.ground.noise
-        lowest, highest = float(self.ability.slip[0]), float(self.ability.slip[-1])
         if self.ability.fraction_still_rising > MAX_STILL_RISING:
             text = (
                 f"in {self.ability.fraction_still_rising:.0%} of the samples the slope still rises "
-                f"with slip at {highest:.2f}, the end of the curve: measure stress at higher slips"
+                f"with slip at {self.ability.slip[-1]:.2f}, the end of the curve: measure stress "
+                "at higher slips"
             )
             warnings.append(Remark("still-rising", text))
         steepest = float(quantile_band(self.ability.steepest).upper)
-        least = ZERO_SLIP_SIGMAS * np.hypot(noise.speed, noise.speed_scale)
-        zero, outside = [], []
-        for climb in self.data.climbs:
-            slips = np.asarray([wheel.slip for wheel in climb.wheels])
-            if (np.abs(slips) < least).any():
-                zero.append(climb.name)
-            if (slips < lowest - SLIP_MARGIN).any() or (slips > highest + SLIP_MARGIN).any():
-                outside.append(climb.name)
-            if climb.slope > steepest:
-                text = (
-                    f"run {climb.name} climbed {np.rad2deg(climb.slope):.3g} deg, more than "
-                    f"predicted (at most {np.rad2deg(steepest):.3g}): it is inconsistent with the "
-                    "others"
-                )
-                warnings.append(Remark("inconsistent", text, (climb.name,)))
+        least = ZERO_SLIP_SIGMAS * np.hypot(noise.speed_m_s.share, noise.speed_scale)
+        climbs = self.data.climbs
+        steep = [c.name for c in climbs if c.slope > steepest]
+        if steep:
+            text = (
+                f"run {', '.join(steep)} climbed more than the predicted "
+                f"{np.rad2deg(steepest):.3g} deg at most: inconsistent with the others"
+            )
+            warnings.append(Remark("inconsistent", text, tuple(steep)))
+        zero = [c.name for c in climbs if any(abs(wheel.slip) < least for wheel in c.wheels)]
         if zero:
             text = (
                 f"slip is zero within its noise in run {', '.join(zero)}: the direction of the "
                 "shear displacement there is not known"
             )
             warnings.append(Remark("zero-slip", text, tuple(zero)))
-        if outside:
-            text = f"the slip of run {', '.join(outside)} lies outside the curve"
-            warnings.append(Remark("outside-curve", text, tuple(outside)))
         differ = [wheel for wheel, found in self.stress.items() if found and not found.equal]
         if differ:
             text = (
@@ -131,15 +111,10 @@ class ClimbingReport:
         """The content of the file that `soilml paper climb` writes."""
         fit, ability, rover = self.ground.fit, self.ability, self.ground.rover
         columns = {name: np.asarray(values).tolist() for name, values in self.climbs.items()}
-        content: dict[str, Any] = {
+        given = dict(zip(SHEAR, self.ground.samples[0].tolist(), strict=True))
+        return {
             "ground": fit.as_json()
-            | {
-                "given": {
-                    name: float(self.ground.samples[0, i])
-                    for i, name in enumerate(SHEAR)
-                    if name not in fit.names
-                }
-            },
+            | {"given": {name: value for name, value in given.items() if name not in fit.names}},
             "front_share": rover.front_share,
             "height_ratio": rover.height_ratio,
             "runs": [
@@ -152,23 +127,14 @@ class ClimbingReport:
             },
             "steepest_slope_rad": _listed(quantile_band(ability.steepest)),
             "slip_at_steepest": _listed(quantile_band(ability.steepest_slip)),
-            "slips_with_stress": [float(ability.slip[0]), float(ability.slip[-1])],
             "warnings": [remark.as_json() for remark in self.warnings],
         }
-        if self.slip_limit is not None:
-            within = quantile_band(ability.steepest_within(self.slip_limit))
-            content["steepest_slope_within_slip_limit_rad"] = _listed(within)
-            content["slip_limit"] = self.slip_limit
-        return content
 
     def report(self, title: str = "Slopes that a rover climbs") -> Report:
         """The steepest slope, the soil, pull and slope over slip, and the check of the stress."""
         fit, ability = self.ground.fit, self.ability
         verdict = f"The rover climbs {_band(quantile_band(ability.steepest), 'rad')}."
         lines = [f"That is at slip {_band(quantile_band(ability.steepest_slip))}."]
-        if self.slip_limit is not None:
-            within = _band(quantile_band(ability.steepest_within(self.slip_limit)), "rad")
-            lines.append(f"At slips up to {self.slip_limit:g} it climbs {within}.")
         checked = {wheel: found for wheel, found in self.stress.items() if found is not None}
         if checked and all(found.equal for found in checked.values()):
             lines.append("Stress on slopes equals stress at artificial slip within its scatter.")
@@ -201,10 +167,17 @@ class ClimbingReport:
             ),
             tables=tables,
             pictures=[
-                Picture(
-                    "Pull and slope over slip", self._draw, 1, 2, (9.0, 3.8), verdict,
-                    "Lines: medians, with bands of 90 %. Dots: the climbs, at the mean slip of "
-                    "both wheels.",
+                column_picture(
+                    self.curve,
+                    "slip",
+                    [("drawbar_pull_N",), ("slope_rad",)],
+                    title="Pull and slope over slip",
+                    caption="Lines: medians, with bands of 90 %. Dots: the climbs, at the mean "
+                    "slip of both wheels.",
+                    measured={
+                        "slip": [0.5 * (c.front.slip + c.rear.slip) for c in self.data.climbs],
+                        "slope_rad": [c.slope for c in self.data.climbs],
+                    },
                 )
             ],
             remarks=self.warnings,
@@ -214,24 +187,7 @@ class ClimbingReport:
             title=title,
             basis=f"{climbs} climb{'s'[: climbs != 1]} on {slopes} slope{'s'[: slopes != 1]}",
             notation=[("90 %", "from the 5 % to the 95 % quantile; medians before them.")],
-        )  # fmt: skip
-
-    def _draw(self, axes: Any) -> None:
-        curve, degree = self.curve, float(np.rad2deg(1.0))
-        shown = (("drawbar_pull_N", 1.0), ("slope_rad", degree))
-        for panel, (name, factor) in zip(axes.flat, shown, strict=True):
-            low, middle, high = (factor * curve[f"{name}{end}"] for end in ("_p05", "", "_p95"))
-            panel.fill_between(curve["slip"], low, high, color=AFTER, alpha=0.3, lw=0, label="90 %")
-            panel.plot(curve["slip"], middle, color=AFTER, lw=1.4, label="median")
-            panel.set_xlabel("slip")
-        pull, slope = axes.flat
-        climbs = self.data.climbs
-        mean_slip = [0.5 * (c.front.slip + c.rear.slip) for c in climbs]
-        climbed = np.rad2deg([c.slope for c in climbs])
-        slope.plot(mean_slip, climbed, "o", color=BEFORE, ms=5, label="climbs, mean slip")
-        pull.set_ylabel("drawbar pull on level ground, N")
-        slope.set_ylabel("slope climbed, degrees")
-        slope.legend(loc="lower right")
+        )
 
 
 def _band(found: QuantileBand, unit: str = "1") -> str:
@@ -243,29 +199,22 @@ def _listed(band: QuantileBand) -> dict[str, Any]:
     return {name: np.asarray(values).tolist() for name, values in named}
 
 
-def climbing_report(
-    file: RoverFile, data: ClimbData, *, slip_limit: float | None = None, seed: int = 0
-) -> ClimbingReport:
+def climbing_report(file: RoverFile, data: ClimbData, *, seed: int = 0) -> ClimbingReport:
     """Identify the soil, fit stress against slip, and predict the climbing ability."""
-    front, rear = StressBySlip.fit(data.front), StressBySlip.fit(data.rear)
-    if slip_limit is not None:
-        check_slip(slip_limit, shared_slips(front, rear))
+    front, rear = (StressBySlip.fit(data.of_wheel(wheel)) for wheel in WHEELS)
     ground = identify_ground(
         file.rover, data.climbs, fixed=file.fixed, prior=file.prior, noise=file.noise, seed=seed
     )
     cohesion, friction, _ = ground.shear
-    known = {"cohesion": cohesion, "friction_angle": friction}
     return ClimbingReport(
         ground,
         climbing_ability(ground, front, rear, seed=seed),
         data,
-        modulus={
-            error: modulus_per_climb(file.rover, data.climbs, speed_error=error, **known)
-            for error in (-SPEED_ERROR, 0.0, SPEED_ERROR)
-        },
+        modulus_per_climb(file.rover, data.climbs, cohesion=cohesion, friction_angle=friction),
         stress={
-            wheel: compare_stress([climb.wheels[i] for climb in data.climbs], data.artificial[i])
+            wheel: compare_stress(
+                [climb.wheels[i] for climb in data.climbs], data.of_wheel(wheel, climbs=False)
+            )
             for i, wheel in enumerate(WHEELS)
         },
-        slip_limit=slip_limit,
     )

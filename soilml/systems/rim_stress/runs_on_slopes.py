@@ -20,7 +20,6 @@ from soilml.report.column_figure import column_picture
 from soilml.report.numbers import format_quantity
 from soilml.report.report import Report
 from soilml.report.tables import ReportTable
-from soilml.systems.rim_stress.deconvolution import deconvolve, fit_stress_arc
 from soilml.systems.rim_stress.force_balance import (
     MohrCoulomb,
     SlopePull,
@@ -31,8 +30,13 @@ from soilml.systems.rim_stress.force_balance import (
     pull_under,
     unit_remarks,
 )
-from soilml.systems.rim_stress.sensor_readings import MeasuredStress, SensingWheel
-from soilml.systems.rim_stress.stress_profile import StressProfile
+from soilml.systems.rim_stress.stress import (
+    MeasuredStress,
+    SensingWheel,
+    StressProfile,
+    deconvolve,
+    fit_stress_arc,
+)
 
 DRAWS = 64  # Draws of the errors of each run, from which standard deviations follow
 #: Standard deviation of ln k_x for stress shapes that `deconvolve` does not represent: skewed

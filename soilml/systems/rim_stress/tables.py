@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -14,19 +13,18 @@ from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError, TableError
 from soilml.io.read_table import read_table
 from soilml.io.table import Table
-from soilml.systems.rim_stress.climb import WHEELS, Climb, WheelRun
+from soilml.systems.rim_stress.climbs import WHEELS, Climb, WheelRun
 from soilml.systems.rim_stress.force_balance import SteadyRun
-from soilml.systems.rim_stress.sensor_readings import (
+from soilml.systems.rim_stress.stress import (
     MeasuredStress,
     SensingWheel,
     SensorReadings,
+    StressProfile,
     bin_stress,
 )
-from soilml.systems.rim_stress.stress_profile import StressProfile
 
 STRESS, READINGS = ("run", "angle_rad", "normal_Pa"), ("run", "angle_rad", "sensor", "force_N")
 SPEEDS = ("speed_m_s", "rim_speed_m_s")
-SLIP_TOLERANCE = 1e-3  # Largest difference between the slips of a run in both tables
 #: Fewest points of a profile whose scatter tells its noise; 20 is the variance of the third
 #: difference of unit noise, 0.798 the mean size of a standard normal number.
 _FEWEST, _THIRD, _MEAN = 8, 20.0, 0.798
@@ -36,12 +34,19 @@ Key = tuple[str, str]  # Run and wheel
 
 @dataclass(frozen=True)
 class ClimbData:
-    """Climbs, and all stresses measured at a known slip, on climbs or on level ground."""
+    """Climbs, and by run and wheel the stresses measured at a known slip, there or elsewhere."""
 
     climbs: tuple[Climb, ...]
-    front: tuple[WheelRun, ...]
-    rear: tuple[WheelRun, ...]
-    artificial: tuple[tuple[WheelRun, ...], tuple[WheelRun, ...]]  # of runs that are no climbs
+    stresses: dict[Key, WheelRun]
+
+    def of_wheel(self, wheel: str, *, climbs: bool = True) -> list[WheelRun]:
+        """All stresses of the front or the rear wheel; those of climbs only where asked for."""
+        names = {climb.name for climb in self.climbs}
+        return [
+            run
+            for (n, w), run in self.stresses.items()
+            if w == wheel and (climbs or n not in names)
+        ]
 
 
 def noise_by_scatter(normal: Floats) -> Floats:
@@ -143,14 +148,15 @@ def read_climb_data(
                 f"{table.place(row)}, column wheel: {str(table['wheel'][row])!r} given; needed is "
                 "front or rear"
             )
-    slips = _slips(climbed)
-    found: dict[Key, WheelRun] = {}
+    slips, found = _slips(climbed), dict[Key, WheelRun]()
     for name, rows in stresses.groups():
         for wheel in dict.fromkeys(rows["wheel"].tolist()):
             part = rows.rows(rows["wheel"] == wheel)
             where = f", run {name}, {wheel}"
             stress = _stress(part, noise.std, where)
-            slip = _slip(part, slips.get((name, wheel)), f"{stresses.source}{where}", runs)
+            slip = slips.get((name, wheel))
+            if slip is None:
+                slip = _one_slip(part, f"{stresses.source}{where}", runs)
             profile = StressProfile(stress.angle, stress.normal)
             found[name, wheel] = WheelRun(slip, profile, stress.std)
     climbs = []
@@ -162,23 +168,13 @@ def read_climb_data(
                 f"{slope[1]:g} rad; needed is one slope per run"
             )
         for wheel in WHEELS:
-            if wheel not in rows["wheel"]:
-                raise TableError(
-                    f"{rows.place(0)}: run {name} has no row for its {wheel} wheel; both wheels "
-                    "are needed"
-                )
-            if (name, wheel) not in found:
-                raise TableError(
-                    f"{stresses.source}: no stress of the {wheel} wheel in run {name}, which is a "
-                    "climb"
-                )
+            where, what = rows.place(0), f"run {name} has no row for its {wheel} wheel"
+            if wheel in rows["wheel"]:
+                where, what = stresses.source, f"no stress of the {wheel} wheel in climb {name}"
+            if (name, wheel) not in found or wheel not in rows["wheel"]:
+                raise TableError(f"{where}: {what}; both wheels are needed")
         climbs.append(Climb(name, float(slope[0]), *(found[name, wheel] for wheel in WHEELS)))
-    every = [tuple(r for (_, w), r in found.items() if w == wheel) for wheel in WHEELS]
-    level = [
-        tuple(r for (n, w), r in found.items() if w == wheel and (n, w) not in slips)
-        for wheel in WHEELS
-    ]
-    return ClimbData(tuple(climbs), every[0], every[1], (level[0], level[1]))
+    return ClimbData(tuple(climbs), found)
 
 
 def _slips(climbed: Table) -> dict[Key, float]:
@@ -211,54 +207,13 @@ def _slips(climbed: Table) -> dict[Key, float]:
     return slips
 
 
-def _slip(rows: Table, climbed: float | None, where: str, runs: str) -> float:
-    """Slip of one wheel in one run, from the table of climbs or from that of stresses."""
-    read = rows["slip"] if "slip" in rows else np.full(len(rows), np.nan)
+def _one_slip(rows: Table, where: str, runs: str) -> float:
+    """Slip of one wheel in a run that is no climb, from the table of stresses."""
+    read = rows["slip"] if "slip" in rows else np.zeros(0)
     read = read[~np.isnan(read)]
-    if len(read) and np.ptp(read) > 0.0:
+    if len(read) == 0 or np.ptp(read) > 0.0:
+        given = "no slip" if len(read) == 0 else f"slip is {read.min():g} to {read.max():g}"
         raise TableError(
-            f"{where}: slip ranges from {read.min():g} to {read.max():g}; needed is one value"
+            f"{where}: {given}; needed is one value in column slip, or this run and wheel in {runs}"
         )
-    if climbed is None and len(read) == 0:
-        raise TableError(
-            f"{where}: no slip; needed is column slip here, or this run and wheel in {runs}"
-        )
-    if climbed is not None and len(read) and abs(read[0] - climbed) > SLIP_TOLERANCE:
-        raise TableError(f"{where}: slip is {read[0]:.4g} here and {climbed:.4g} in {runs}")
-    return float(read[0]) if climbed is None else climbed
-
-
-Columns = dict[str, list[Any]]
-
-
-def climb_tables(
-    climbs: Sequence[Climb],
-    front: Sequence[WheelRun] = (),
-    rear: Sequence[WheelRun] = (),
-    *,
-    rim_speed: float,
-) -> tuple[Columns, Columns]:
-    """Tables (climbs, stresses) of columns as they are read, with speeds by that of the rim (m/s).
-
-    `front` and `rear` are stresses at artificial slip, which become separate runs.
-    """
-    climbed = [(c, w, run) for c in climbs for w, run in zip(WHEELS, c.wheels, strict=True)]
-    runs: Columns = {
-        "run": [c.name for c, _, _ in climbed],
-        "wheel": [wheel for _, wheel, _ in climbed],
-        "slope_rad": [c.slope for c, _, _ in climbed],
-        "speed_m_s": [rim_speed * (1.0 - run.slip) for _, _, run in climbed],
-        "rim_speed_m_s": [rim_speed for _ in climbed],
-    }
-    stressed = [(c.name, wheel, run) for c, wheel, run in climbed]
-    for wheel, artificial in zip(WHEELS, (front, rear), strict=True):
-        stressed += [(f"flat_{wheel}_{i}", wheel, run) for i, run in enumerate(artificial, 1)]
-    samples = [
-        (name, wheel, run.slip, float(angle), float(normal))
-        for name, wheel, run in stressed
-        for angle, normal in zip(run.profile.angle, run.profile.normal, strict=True)
-    ]
-    names = ("run", "wheel", "slip", "angle_rad", "normal_Pa")
-    return runs, {
-        name: list(column) for name, column in zip(names, zip(*samples, strict=True), strict=True)
-    }
+    return float(read[0])

@@ -6,50 +6,24 @@ and `identify_groups` the soil parameters from groups of pulls. `low_pass`, `sta
 Source: Wang, Yan and Du, J. Terramechanics 77, 2018.
 """
 
-from soilml.systems.tracked_robot.group_identification import (
-    GroupFits,
-    Regression,
-    identify_groups,
-    linear_regression,
-)
+from soilml.systems.tracked_robot.group_identification import GroupFits, identify_groups
 from soilml.systems.tracked_robot.robot import (
-    BEYOND_PEAK,
-    GROUSERS,
-    WANG2018,
     DiscreteGrousers,
     TrackBalance,
     TrackedRobot,
     grouser_pull,
-    settling_from_moments,
     track_balance,
 )
 from soilml.systems.tracked_robot.signals import (
     StationaryMean,
     low_pass,
     rear_sinkage,
-    rut_mean,
     slip_from_displacements,
     stationary_mean,
 )
 
 __all__ = [
-    "BEYOND_PEAK",
-    "GROUSERS",
-    "WANG2018",
-    "DiscreteGrousers",
-    "GroupFits",
-    "Regression",
-    "StationaryMean",
-    "TrackBalance",
-    "TrackedRobot",
-    "grouser_pull",
-    "identify_groups",
-    "linear_regression",
-    "low_pass",
-    "rear_sinkage",
-    "rut_mean",
-    "settling_from_moments",
-    "slip_from_displacements",
-    "stationary_mean",
-    "track_balance",
-]
+    "DiscreteGrousers", "GroupFits", "StationaryMean", "TrackBalance", "TrackedRobot",
+    "grouser_pull", "identify_groups", "low_pass", "rear_sinkage", "slip_from_displacements",
+    "stationary_mean", "track_balance",
+]  # fmt: skip

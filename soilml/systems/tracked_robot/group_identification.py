@@ -1,23 +1,19 @@
-"""Soil parameters from groups of pulls of a tracked robot, averaged, and regressions of pulls."""
+"""Soil parameters from groups of pulls of a tracked robot, averaged."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.errors import FitError, InputError
-from soilml.fitting.operating_points import operating_points
-from soilml.fitting.predictions import forces_of_one_gear
+from soilml.errors import InputError
 from soilml.identification import Fit, identify
 from soilml.identification.fit import identifiability_remarks
 from soilml.io.table import Table
-from soilml.quantities import CHANNELS, WEAKLY_IDENTIFIED_ABOVE, Z_90, column
+from soilml.quantities import Z_90
 
 #: Parameters that the source identifies from the pull alone, in its order.
 PARAMETERS = ("n", "friction_angle", "kphi", "shear_modulus", "cohesion")
@@ -34,7 +30,10 @@ class GroupFits:
     pooled: Fit | None = None
 
     def __post_init__(self) -> None:
-        _refuse_one(len(self.fits))
+        if len(self.fits) < 2:
+            raise InputError(
+                f"{len(self.fits)} groups of data are given; an average needs two or more"
+            )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -73,15 +72,6 @@ class GroupFits:
         return {n: float(np.mean([left[n] for left in each])) for n in names}
 
     @property
-    def unidentified(self) -> tuple[str, ...]:
-        """Parameters whose average is determined mostly by the prior."""
-        return tuple(
-            name
-            for name, share in self.remaining_fraction.items()
-            if share > WEAKLY_IDENTIFIED_ABOVE
-        )
-
-    @property
     def average(self) -> Fit:
         """The average as a fit: its errors, what is left of the priors, and warnings by that.
 
@@ -117,109 +107,7 @@ def identify_groups(
     fewer than two groups, `FitError` for rows that cannot be fitted. References: Wang et al. 2018,
     section 4.2.
     """
-    _refuse_one(len(tables))
     groups = GroupFits(tuple(identify(case, table, free, method) for table in tables))
     names = [name for name in tables[0].columns if all(name in table for table in tables)]
     rows = {name: np.concatenate([table[name] for table in tables]) for name in names}
     return replace(groups, pooled=identify(case, Table(rows), free, method))
-
-
-def _refuse_one(count: int) -> None:
-    if count < 2:
-        raise InputError(f"{count} groups of data are given; an average needs two or more")
-
-
-def predicted(case: Case, fit: Fit, table: Table, channel: str = "drawbar_pull") -> Floats:
-    """A channel (SI units) predicted with the fitted values for the rows of a table, (n,)."""
-    fitted = case.with_values(dict(zip(fit.names, fit.values.tolist(), strict=True)))
-    return np.asarray(getattr(forces_of_one_gear(fitted, operating_points(table)), channel))
-
-
-@dataclass(frozen=True)
-class Regression:
-    """A regression line with its coefficient of determination and F."""
-
-    slope: float
-    slope_std: float
-    intercept: float  # in the unit of y
-    r2: float
-    f: float
-    points: int
-
-
-def linear_regression(x: ArrayLike, y: ArrayLike) -> Regression:
-    r"""Least-squares line of y on x, both (n,), three points or more.
-
-    .. math::
-        r^2 = \frac{S_{xy}^2}{S_{xx} S_{yy}}, \quad F = \frac{r^2}{1 - r^2} (N - 2), \quad
-        s_a = \sqrt{\frac{S_{yy} (1 - r^2)}{(N - 2) S_{xx}}}
-
-    High r2 and F show correlation, not agreement, which requires slope 1 and intercept 0.
-    `slope_std` is valid for independent points and x without error. Raises `InputError` for
-    invalid points, `FitError` if all x or all y are equal. References: Draper and Smith, Applied
-    Regression Analysis, ch. 1; reported by Wang et al. 2018, section 4.2.2.
-
-    Examples
-    --------
-    >>> line = linear_regression([1.0, 2.0, 4.0], [3.0, 5.0, 9.0])
-    >>> round(line.slope, 6), round(line.intercept, 6), line.points
-    (2.0, 1.0, 3)
-    """
-    a, b = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    if a.ndim != 1 or a.shape != b.shape or len(a) < 3:
-        raise InputError(
-            f"x has the shape {a.shape} and y {b.shape}; needed are two rows of one length, of "
-            "three points or more"
-        )
-    if not (np.isfinite(a).all() and np.isfinite(b).all()):
-        raise InputError("a point is not finite; leave it out")
-    xx, xy, yy = np.cov(a, b)[[0, 0, 1], [0, 1, 1]].tolist()
-    if xx == 0.0 or yy == 0.0:
-        raise FitError("all points have the same x, or the same y: there is no regression line")
-    slope, r2, freedom = xy / xx, xy * xy / (xx * yy), len(a) - 2
-    left = max(1.0 - r2, 0.0)
-    return Regression(
-        slope=slope,
-        slope_std=math.sqrt(yy * left / (freedom * xx)),
-        intercept=float(b.mean() - slope * a.mean()),
-        r2=r2,
-        f=r2 / left * freedom if left > 0.0 else math.inf,
-        points=len(a),
-    )
-
-
-@dataclass(frozen=True)
-class ChannelRegression:
-    """Measured on predicted values (n,) of a channel, in SI units, and their regression line."""
-
-    predicted: Floats
-    measured: Floats
-    line: Regression
-
-
-def regressions(case: Case, fit: Fit, table: Table) -> dict[str, ChannelRegression]:
-    """Regression of each channel that the rows measured on what a fit predicts, by column.
-
-    The rows should be others than those of the fit: the line of its own rows tests nothing.
-    Raises `InputError` for fewer than three readings of a channel, and where none was measured.
-    References: Wang et al. 2018, section 4.2.2.
-    """
-    found = {}
-    for channel in CHANNELS:
-        key = column(channel)
-        if key not in table or not np.isfinite(table[key]).any():
-            continue
-        value = predicted(case, fit, table, channel)
-        read = np.isfinite(value) & np.isfinite(table[key])
-        x, y = value[read], np.asarray(table[key][read], dtype=np.float64)
-        found[key] = ChannelRegression(x, y, linear_regression(x, y))
-    if not found:
-        raise InputError(f"{table.source} has no readings to compare with predictions")
-    return found
-
-
-def implied_points(r2: float, f: float) -> float:
-    """Number of points implied by a printed r2 and F of a line: F (1 - r2) / r2 + 2."""
-    if not (0.0 < r2 < 1.0 and f > 0.0):
-        raise InputError(f"r2 is {r2:g} and F {f:g}; r2 must lie between 0 and 1, F above 0")
-    return f * (1.0 - r2) / r2 + 2.0

@@ -12,7 +12,6 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.operating_points import operating_points
-from soilml.fitting.simulation import simulate
 from soilml.io.table import Table
 from soilml.physics.contact import stress
 from soilml.physics.effects import Effect, ShearSoftening, TrackGrousers
@@ -24,7 +23,6 @@ from soilml.physics.soils import Soil
 
 GRAVITY = 9.81
 PHASES = 16  # Places of the first grouser over which discrete ones are averaged
-BISECTIONS = 16  # Bisection steps for the settling between 0 and 0.5: 0.5 / 2^16 is below 1e-5
 
 
 @dataclass(frozen=True)
@@ -153,8 +151,7 @@ def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -
 
     A belt without bending stiffness on a circular arc has the tension b R_t sigma at every point;
     since the pressure varies along the arc, the mean tension is returned. The trim angle follows
-    from the displacements of both wheels; it is that of a robot whose centre of mass is behind the
-    middle of its base by `centre` less (hitch height) DP / W.
+    from the displacements of both wheels.
 
     Parameters
     ----------
@@ -163,7 +160,7 @@ def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -
     soil, at
         Soil parameters, and slip and load of one track.
     points
-        Points along the belt for the integrals, 3 or more.
+        Points along the belt for the integrals.
 
     Raises
     ------
@@ -183,8 +180,6 @@ def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -
     [0.14, 0.8, 0.05]
     """
     track, force = track_of(model), model(soil, at)
-    if points < 3:
-        raise InputError(f"points is {points}; needed are 3 or more along the belt")
     belt = track.contact_geometry(force.sinkage, soil, at)
     profile = model.profile(soil, at, points)
     ends = [distance_along(belt, a, i) for a, i in ((FRONT, -belt.leave), (MIDDLE, belt.meet))]
@@ -201,102 +196,28 @@ def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -
     below_front = track.radius * np.sin(belt.entry)
     centre = np.sum(ahead * lift * weight, axis=0) / load - below_front
     length = belt.arc_radius * (belt.leave + belt.meet)
+    pressure = np.sum(profile.normal * weight * middle, axis=0) / length
     return TrackBalance(
         front=np.sum(lift * weight * front, axis=0) / load,
         middle=np.sum(lift * weight * middle, axis=0) / load,
         rear=np.sum(lift * weight * rear, axis=0) / load,
         trim=belt.trim,
         arc_radius=belt.arc_radius,
-        tension=track.width
-        * belt.arc_radius
-        * np.sum(profile.normal * weight * middle, axis=0)
-        / length,
+        tension=track.width * belt.arc_radius * pressure,
         tension_gain=track.width * np.sum(profile.shear * weight * middle, axis=0),
         centre=centre - 0.5 * track.base * np.cos(belt.trim),
     )
 
 
-def settling_from_moments(
-    model: Model, soil: Soil, at: Operating, *, behind: float = 0.0, hitch: float = 0.0
-) -> Floats:
-    r"""Settling R_1f at which the moments about the middle of the belt's base balance.
-
-    .. math:: W x(R_{1f}) = W x_m + h \, DP
-
-    with x the centre of pressure, x_m `behind` (m) the distance of the centre of mass behind the
-    middle, and h `hitch` (m) the height above the belt at which the payload pulls back. Solved by
-    bisection to 1e-5; the result has the shape of the operating points and is NaN where no settling
-    between 0 and 0.5 balances (a robot whose front sinks). The trim angle then follows from the
-    load instead of a constant of the soil. Own derivation; Wang et al. 2018 print no balance of
-    moments.
-    """
-    if not np.isfinite([behind, hitch]).all():
-        raise InputError(f"behind is {behind:g} m and hitch {hitch:g} m; both must be numbers")
-    track = track_of(model)
-    shape = np.broadcast_shapes(np.shape(at.slip), np.shape(at.load))
-    conditions = replace(
-        at, slip=np.broadcast_to(at.slip, shape), load=np.broadcast_to(at.load, shape)
-    )
-
-    def excess(settling: Floats) -> Floats:
-        trimmed = replace(model, gear=replace(track, settling=settling))
-        required = behind + hitch * trimmed(soil, conditions).drawbar_pull / conditions.load
-        return np.asarray(track_balance(trimmed, soil, conditions, points=801).centre - required)
-
-    low, high = np.zeros(shape), np.full(shape, 0.5)
-    solvable = (excess(low) <= 0.0) & (excess(high) >= 0.0)
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        too_low = excess(middle) < 0.0
-        low, high = np.where(too_low, middle, low), np.where(too_low, high, middle)
-    return np.where(solvable, 0.5 * (low + high), np.nan)
-
-
-#: Status of a row at whose moments no settling between 0 and 0.5 balances.
-UNBALANCED = "no trim balances the moments: the front sinks, or the tail beyond the model"
-
-
-def settled_rows(
-    case: Case, slip: Floats, load: Floats, *, behind: float, hitch: float, **options: Any
-) -> tuple[Table, Floats]:
-    """Rows that a case with a track predicts at the settling that the moments of each require.
-
-    slip, load: (n,), load in N.
-    behind, hitch: As in `settling_from_moments`, whose settling (n,) is returned with the table.
-    options: Of `soilml.simulate`.
-
-    Rows without a settling are blank, with `UNBALANCED` as status.
-    """
-    at = Operating(slip=slip, load=load)
-    settling = settling_from_moments(case.model, case.soil, at, behind=behind, hitch=hitch)
-    parts = []
-    for one, s, w in zip(np.nan_to_num(settling), slip, load, strict=True):
-        gear = replace(track_of(case.model), settling=float(one))
-        own = replace(case, model=replace(case.model, gear=gear))
-        parts.append(simulate(own, s, w, **options).columns)
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    stands = np.isfinite(settling)
-    for name, values in columns.items():
-        if name not in ("run", "slip", "load_N", "status", "traffic_class"):
-            columns[name] = np.where(stands, values, np.nan)
-    columns["status"] = np.where(stands, columns["status"], UNBALANCED)
-    return Table(columns, source="simulated rows"), settling
-
-
-def balanced_rows(case: Case, table: Table, settling: Floats | None = None) -> Table:
+def balanced_rows(case: Case, table: Table) -> Table:
     """Simulated rows with how the track stands in the soil.
 
     Added are the shares of the load under front wheel, belt and rear wheel, the trim (rad), the
     sinkage of the rear wheel (m), the tension of the belt (N), and the centre of pressure behind
-    the middle (m); `settling` (n,) too, where it is not the track's own. Raises `InputError` for
-    another gear.
+    the middle (m). Raises `InputError` for another gear.
     """
-    track, at = track_of(case.model), operating_points(table)
-    columns = dict(table.columns)
-    if settling is not None:
-        track = replace(track, settling=np.nan_to_num(settling))
-        columns["settling"] = settling
-    balance = track_balance(replace(case.model, gear=track), case.soil, at)
+    track, at, columns = track_of(case.model), operating_points(table), dict(table.columns)
+    balance = track_balance(case.model, case.soil, at)
     belt = track.contact_geometry(columns["sinkage_m"], case.soil, at)
     own = {
         "front_share": balance.front,

@@ -48,14 +48,10 @@ def low_pass(signal: ArrayLike, rate: float, cutoff: float) -> Floats:
     Butterworth 1930; Gustafsson, IEEE Trans. Signal Proc. 44(4), 1996.
     """
     x = _check_signal(signal, "signal", PADDING + 1)
-    if not (0.0 < rate < math.inf and 0.0 < cutoff < 0.5 * rate):
+    if not MIN_CUTOFF * rate <= cutoff < 0.5 * rate:
         raise InputError(
-            f"cutoff is {cutoff:g} Hz at a rate of {rate:g} Hz; it must lie between 0 and half that"
-        )
-    if cutoff < MIN_CUTOFF * rate:
-        raise InputError(
-            f"cutoff is {cutoff:g} Hz at a rate of {rate:g} Hz; below {MIN_CUTOFF * rate:g} Hz the "
-            "filter is inaccurate: reduce the sampling rate first"
+            f"cutoff is {cutoff:g} Hz at a rate of {rate:g} Hz; it must lie below half of that, "
+            f"and above {MIN_CUTOFF * rate:g} Hz, where the filter is accurate"
         )
     try:
         from scipy.signal import butter, filtfilt
@@ -113,10 +109,7 @@ def slip_from_displacements(track: ArrayLike, robot: ArrayLike, span: int) -> Fl
     >>> slip_from_displacements(belt, 0.7 * belt, span=100)[:2].round(3)
     array([0.3, 0.3])
     """
-    belt, ground = _check_signal(track, "track", 2), _check_signal(robot, "robot", 2)
-    _check_lengths(track=belt, robot=ground)
-    if not 1 <= span < len(belt):
-        raise InputError(f"span is {span} samples; it must lie between 1 and {len(belt) - 1}")
+    belt, ground = _check_signal(track, "track", span + 1), _check_signal(robot, "robot", span + 1)
     advance = belt[span:] - belt[:-span]
     if np.any(advance <= 0.0):
         worst = int(np.argmin(advance))
@@ -137,38 +130,10 @@ def rear_sinkage(rear: ArrayLike, front: ArrayLike, angle: ArrayLike, spacing: f
     which prints l_r twice; the second must be the front reading, or a level robot on undisturbed
     ground would have a sinkage.
     """
-    l_r, l_f, delta = (
-        _check_signal(x, name, 1)
-        for x, name in ((rear, "rear"), (front, "front"), (angle, "angle"))
-    )
-    _check_lengths(rear=l_r, front=l_f, angle=delta)
-    if not 0.0 < spacing < math.inf:
-        raise InputError(f"spacing is {spacing:g} m; it must be above 0")
-    if np.abs(delta).max() >= 0.5 * math.pi:
-        worst = int(np.abs(delta).argmax())
-        raise InputError(
-            f"angle is {delta[worst]:g} at sample {worst}; needed is an inclination in rad"
-        )
+    l_r, l_f, delta = (np.asarray(x, dtype=np.float64) for x in (rear, front, angle))
+    if not (most := float(np.abs(delta).max())) < 0.5 * math.pi:
+        raise InputError(f"the inclination reaches {most:g}; needed is an inclination in rad")
     return np.asarray(l_r + spacing * np.sin(delta) - l_f)
-
-
-def rut_mean(crest: ArrayLike, bottom: ArrayLike, crest_length: float, pitch: float) -> Floats:
-    r"""Nominal sinkage (m) of a rut with grouser marks that has the same volume of soil.
-
-    .. math:: z = \frac{L_1}{L} z_2 + \frac{L - L_1}{L} z_1
-
-    z_2 is `crest` (m), over the length L_1, z_1 `bottom` (m) over the rest of the pitch L;
-    arrays (n,). References: Wang et al. 2018, eqs. 16-17.
-    """
-    upper, lower = _check_signal(crest, "crest", 1), _check_signal(bottom, "bottom", 1)
-    _check_lengths(crest=upper, bottom=lower)
-    if not 0.0 <= crest_length <= pitch or pitch <= 0.0:
-        raise InputError(
-            f"crest_length is {crest_length:g} m with a pitch of {pitch:g} m; it must lie between "
-            "0 and the pitch"
-        )
-    share = crest_length / pitch
-    return np.asarray(share * upper + (1.0 - share) * lower)
 
 
 def _is_stationary(parts: Floats) -> NDArray[np.bool_]:
@@ -196,10 +161,3 @@ def _check_signal(signal: ArrayLike, name: str, fewest: int) -> Floats:
         first = int(np.argmin(np.isfinite(x)))
         raise InputError(f"{name} is {x[first]} at sample {first}; fill or cut missing samples")
     return x
-
-
-def _check_lengths(**signals: Floats) -> None:
-    """Raise `InputError` if simultaneous signals differ in length."""
-    if len({len(x) for x in signals.values()}) > 1:
-        lengths = ", ".join(f"{name} {len(x)}" for name, x in signals.items())
-        raise InputError(f"signals of one length are needed; samples: {lengths}")

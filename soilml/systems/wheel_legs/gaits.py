@@ -13,8 +13,7 @@ from soilml.arrays import Array
 from soilml.errors import InputError
 from soilml.report.column_figure import column_picture
 from soilml.report.report import Picture
-from soilml.systems.wheel_legs.geometry import wheel_leg
-from soilml.systems.wheel_legs.resistive_force import LinearGround
+from soilml.systems.wheel_legs.resistive_force import LinearGround, wheel_leg
 from soilml.systems.wheel_legs.walk import Walk, WalkStatus, walk
 
 TURN = 2.0 * np.pi

@@ -18,13 +18,15 @@ loosely packed grains, slow motion (no inertia of the grains) and plates near th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, final
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Annotated, Any, final
 
 import numpy as np
 
 from soilml.arrays import Array
-from soilml.parameters import Parameter
+from soilml.errors import InputError
+from soilml.parameters import Parameter, check
 
 #: Coefficients of the generic granular medium, scaled so that alpha_z(0, pi/2) = 1; by (k, l).
 A = {(0, 0): 0.206, (1, 0): 0.169}
@@ -33,43 +35,23 @@ C = {(1, 1): -0.124, (0, 1): 0.253, (-1, 1): 0.007}
 D = {(1, 0): 0.088}
 
 
-def stress_gains(attack: Array, intrusion: Array) -> tuple[Array, Array]:
-    r"""(alpha_x, alpha_z) of the generic medium at attack and intrusion angles, rad.
+def resistance_terms(c2: Array, s2: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
+    r"""Stress per depth on plates, forward and upward, for the generic medium, in six terms.
 
     .. math::
         \alpha_z = \sum_{k,l} [A_{kl} \cos(2k\beta + l\gamma) + B_{kl} \sin(2k\beta + l\gamma)]
 
-    and alpha_x with C and D (Comin and Saaj 2017, eq. 5, with sines). A plate moving
-    backwards, |gamma| > pi/2, is the mirror image: alpha_x changes its sign. Inputs broadcast.
+        (\sigma_x, \sigma_z) / z = (-\alpha_x, \alpha_z) = \sigma_{rest}(\beta) - R(\beta) \hat v
+
+    and alpha_x with C and D (Comin and Saaj 2017, eq. 5, with sines). Static part (x, z) and matrix
+    R (xx, xz, zx, zz) at cos 2 beta and sin 2 beta, beta anticlockwise from the direction of travel
+    x; v is the direction of motion, a unit vector with z upwards, so that no angle is wrapped.
 
     Examples
     --------
-    >>> alpha_x, alpha_z = stress_gains(0.0, 0.5 * np.pi)  # a flat plate pushed straight down
-    >>> round(float(alpha_z), 3)
+    >>> _, rest, *_, zz = resistance_terms(1.0, 0.0)  # a flat plate pushed straight down
+    >>> round(rest + zz, 3)
     1.0
-    """
-    beta, gamma = np.broadcast_arrays(np.asarray(attack, float), np.asarray(intrusion, float))
-    ahead = np.where(np.cos(gamma) < 0, -1.0, 1.0)
-    gamma = np.arctan2(np.sin(gamma), np.abs(np.cos(gamma)))
-    beta = ahead * beta
-
-    def series(cosines: dict[tuple[int, int], float], sines: dict[tuple[int, int], float]) -> Array:
-        even = sum(w * np.cos(2 * k * beta + m * gamma) for (k, m), w in cosines.items())
-        odd = sum(w * np.sin(2 * k * beta + m * gamma) for (k, m), w in sines.items())
-        return even + odd
-
-    return ahead * series(C, D), series(A, B)
-
-
-def resistance_terms(c2: Array, s2: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
-    r"""Stress per depth on plates, forward and upward, for the generic medium, in six terms.
-
-    .. math:: (\sigma_x, \sigma_z) / z = \sigma_{rest}(\beta) - R(\beta) \hat v
-
-    Static part (x, z) and matrix R (xx, xz, zx, zz) at cos 2 beta and sin 2 beta, beta
-    anticlockwise from the direction of travel x; v is the direction of motion, a unit vector with
-    z upwards. The same law as `stress_gains`, linear in that vector once its angles are written
-    out: no angle is wrapped, no mirror image is chosen, and the Jacobian is explicit.
     """
     return (
         -D[1, 0] * s2,
@@ -99,19 +81,13 @@ class LinearGround:
     offset: Annotated[float, Parameter("Pa", 0.0, 1e7, "sigma_0, stress at the surface")] = 0.0
     friction_angle: Annotated[float, Parameter("rad", 0.0, 1.4, "phi; not used in walking")] = 0.6
 
+    def __post_init__(self) -> None:
+        check(self, "ground: ")
+
     @property
     def normal_stiffness(self) -> float:
         """sigma_1, the normal stress one centimetre deep, Pa."""
         return self.offset + self.stiffness * LUMPED_AT
-
-    @property
-    def invalid_reason(self) -> str:
-        """Why the ground is invalid; empty if it is valid."""
-        if not (np.isfinite(self.stiffness) and self.stiffness > 0.0):
-            return f"a stiffness of {self.stiffness:g} N/m^3; it must be positive"
-        if not (np.isfinite(self.offset) and self.offset >= 0.0):
-            return f"an offset of {self.offset:g} Pa; it must be 0 or more"
-        return ""
 
 
 #: The four soils of the tests, prepared by raking (Comin and Saaj 2017, table I).
@@ -121,3 +97,248 @@ GROUNDS: dict[str, LinearGround] = {
     "SSC-3": LinearGround(stiffness=0.70e6, offset=2900.0, friction_angle=0.507891),
     "ES-3": LinearGround(stiffness=1.70e6, offset=5000.0, friction_angle=0.625351),
 }
+
+
+MAX_LEGS = 6  # Largest number of legs: neighbouring feet must not load the same soil
+
+
+@final
+@dataclass(frozen=True)
+class Section:
+    """A strip of constant width and curvature: leg, tip or heel (Comin and Saaj 2017, fig. 4).
+
+    `arc` is the height of the arc over its chord, positive to the right on the way from the hub
+    along the leg and the foot. A leg bulges to the rear, a tip downwards and a heel upwards. The
+    heel of the CIF, -0.5 cm, is thus convex and its tip, -1 cm, concave, as stated in the paper.
+    """
+
+    segments: int
+    width: Annotated[float, Parameter("m", 1e-6, 10.0)]
+    length: Annotated[float, Parameter("m", 1e-6, 10.0, "along the chord")]
+    arc: Annotated[float, Parameter("m", -10.0, 10.0)]
+
+    def outline(self) -> tuple[Array, Array]:
+        """End points of the segments along and normal to the chord, (segments + 1,), m.
+
+        The segments are chords of the arc, equally long.
+        """
+        chord, bulge = self.length, self.arc
+        if abs(bulge) < 1e-9:
+            return np.linspace(0.0, chord, self.segments + 1), np.zeros(self.segments + 1)
+        radius = (0.25 * chord**2 + bulge**2) / (2.0 * abs(bulge))
+        half = 2.0 * np.arctan2(2.0 * abs(bulge), chord)
+        angle = np.linspace(-half, half, self.segments + 1)
+        along = 0.5 * chord + radius * np.sin(angle)
+        return along, np.sign(bulge) * radius * (np.cos(angle) - np.cos(half))
+
+
+@final
+@dataclass(frozen=True)
+class Foot:
+    """A foot across the end of a leg: a tip in front and a heel behind, or neither."""
+
+    tip: Section | None = None
+    heel: Section | None = None
+
+
+#: Feet by name (Comin and Saaj 2017, table III): Load Testing Foot, Symmetric Rubber Foot, Camel
+#: Inspired Foot. The arc of the LTF is taken as symmetric about its chord, of radius 3.9 cm; in
+#: midstance (`stances.FOOT`) the same print is taken as an arc that leaves the leg level, 14.8 cm.
+FEET: dict[str, Foot] = {
+    "none": Foot(),
+    "LTF": Foot(tip=Section(20, 0.029, 0.04, 0.0055)),
+    "SRF": Foot(tip=Section(10, 0.027, 0.025, 0.0), heel=Section(10, 0.027, 0.025, 0.0)),
+    "CIF": Foot(tip=Section(13, 0.08, 0.065, -0.01), heel=Section(7, 0.05, 0.055, -0.005)),
+}
+
+
+@final
+@dataclass(frozen=True)
+class WheelLeg:
+    """A rimless wheel of equal legs, and the part of the robot's body that it carries.
+
+    Leg and mass as simulated in the paper (table III). The body is a flat plate `clearance` below
+    the hub that supports the robot where no leg does. Its clearance and area are not printed and
+    are assumed; an area of zero omits it.
+    """
+
+    foot: Foot = FEET["LTF"]
+    legs: int = 5
+    mass: Annotated[float, Parameter("kg", 1e-6, 1e6)] = 3.75
+    speed: Annotated[float, Parameter("rad/s", 1e-6, 1e3, "forwards")] = 0.3
+    leg: Section = Section(10, 0.016, 0.18, 0.03)
+    clearance: Annotated[float, Parameter("m", 0.0, 10.0, "assumed")] = 0.02
+    body_area: Annotated[float, Parameter("m^2", 0.0, 10.0, "assumed")] = 0.04
+
+    def __post_init__(self) -> None:
+        """Raise `InputError` for sizes out of bounds, and for too many legs."""
+        check(self, "wheel-leg: ")
+        if self.legs not in range(1, MAX_LEGS + 1):
+            raise InputError(f"{self.legs} legs; the model is for 1 to {MAX_LEGS}")
+
+    def plates(self) -> Plates:
+        """All segments of all legs, the first leg pointing straight down; the body is last."""
+        along, aside = self.leg.outline()
+        parts = [_plates(along, -aside, self.leg.width)]
+        for section, ahead in ((self.foot.tip, 1.0), (self.foot.heel, -1.0)):
+            if section is not None:
+                forward, right = section.outline()
+                down = self.leg.length + ahead * right
+                parts.append(_plates(down, ahead * forward, section.width))
+        down, forward, area, tilt = (np.concatenate(part) for part in zip(*parts, strict=True))
+        turn = 2.0 * np.pi * np.arange(self.legs)[:, None] / self.legs
+        x = np.sin(turn) * down + np.cos(turn) * forward
+        z = np.sin(turn) * forward - np.cos(turn) * down
+        return Plates(
+            x=np.append(x, 0.0),
+            z=np.append(z, -self.clearance),
+            area=np.append(np.tile(area, self.legs), self.body_area),
+            tilt=np.append(turn + tilt, 0.0),
+            turns=np.append(np.ones(x.size), 0.0),
+        )
+
+
+@dataclass(frozen=True)
+class Plates:
+    """Flat segments about the hub: centre (x, z), m, area, m^2, tilt, rad; arrays (plates,)."""
+
+    x: Array
+    z: Array
+    area: Array
+    tilt: Array  # from the direction of travel, anticlockwise
+    turns: Array  # 1 for plates that turn with the wheel, 0 for the body
+
+
+def _plates(down: Array, forward: Array, width: float) -> tuple[Array, Array, Array, Array]:
+    """(down, forward, area, tilt) of the segments between points of a vertical leg."""
+    fall, run = np.diff(down), np.diff(forward)
+    middle_down, middle_forward = 0.5 * (down[1:] + down[:-1]), 0.5 * (forward[1:] + forward[:-1])
+    return middle_down, middle_forward, width * np.hypot(fall, run), np.arctan2(-fall, run)
+
+
+def wheel_leg(foot: str = "LTF", **changes: Any) -> WheelLeg:
+    """The paper's wheel-leg with a foot of `FEET`, and other fields of `WheelLeg` replaced.
+
+    Raises `InputError` for an unknown foot, and for an invalid wheel-leg.
+
+    Examples
+    --------
+    >>> wheel_leg("CIF", legs=3).plates().x.shape  # 10 + 13 + 7 segments of each leg, and the body
+    (91,)
+    """
+    if foot not in FEET:
+        raise InputError(f"no foot {foot!r}; there are: {', '.join(FEET)}")
+    return WheelLeg(foot=FEET[foot], **changes)
+
+
+#: Depth over which the offset of the normal stress builds up, m, so that the force is continuous.
+SKIN = 0.001
+#: Speed below which the direction of motion is regularised, as a fraction of the speed of the leg's
+#: end: 1 mm/s for the paper's wheel-leg.
+FADING = 0.02
+
+
+@dataclass(frozen=True)
+class WalkingLegs:
+    """Wheel-legs on their grounds: plates at angle zero, (plates, cases), and numbers, (cases,)."""
+
+    x: Array  # m
+    z: Array  # m
+    area: Array  # m^2; 0 pads cases with fewer plates
+    c2: Array  # cos and sin of twice the tilt
+    s2: Array
+    turns: Array  # 1 for plates that turn with the wheel, 0 for the body
+    speed: Array  # rad/s
+    stiffness: Array  # N/m^3
+    offset: Array  # Pa
+    mass: Array  # kg
+    tip_speed: Array  # m/s, of the leg's end about the hub
+    legs: Array
+    slip: Array  # commanded; NaN where the wheel rolls freely
+
+    @staticmethod
+    def of(wheels: Sequence[WheelLeg], grounds: Sequence[LinearGround], slip: Array) -> WalkingLegs:
+        """Stack the plates of all cases, padded with plates of zero area."""
+        plates = [wheel.plates() for wheel in wheels]
+        most = max(p.x.size for p in plates)
+
+        def padded(name: str) -> Array:
+            columns = [np.asarray(getattr(p, name), float) for p in plates]
+            return np.stack([np.pad(c, (0, most - c.size)) for c in columns], axis=1)
+
+        tilt = padded("tilt")
+        return WalkingLegs(
+            x=padded("x"),
+            z=padded("z"),
+            area=padded("area"),
+            c2=np.cos(2.0 * tilt),
+            s2=np.sin(2.0 * tilt),
+            turns=padded("turns"),
+            speed=np.array([w.speed for w in wheels], float),
+            stiffness=np.array([g.stiffness for g in grounds], float),
+            offset=np.array([g.offset for g in grounds], float),
+            mass=np.array([w.mass for w in wheels], float),
+            tip_speed=np.array([w.speed * w.leg.length for w in wheels], float),
+            legs=np.array([w.legs for w in wheels]),
+            slip=np.asarray(slip, float),
+        )
+
+    def select(self, cases: Array) -> WalkingLegs:
+        """A subset of the cases."""
+        return WalkingLegs(**{f.name: getattr(self, f.name)[..., cases] for f in fields(self)})
+
+    def at(self, angle: float) -> tuple[Array, Array, Array, Array]:
+        """Plates relative to the hub (x, z) and doubled tilts (cos, sin) after turning by `angle`.
+
+        In rad, forwards.
+        """
+        c, s = np.cos(angle * self.turns), np.sin(angle * self.turns)
+        double_c, double_s = c * c - s * s, 2.0 * c * s
+        return (
+            self.x * c + self.z * s,
+            self.z * c - self.x * s,
+            self.c2 * double_c + self.s2 * double_s,
+            self.s2 * double_c - self.c2 * double_s,
+        )
+
+    def reaction(
+        self, pose: tuple[Array, Array, Array, Array], height: Array, ahead: Array, up: Array
+    ) -> tuple[Array, Array]:
+        r"""Force ahead and up (N), torque of the motor (N m), (3, cases); rates (2, 3, cases).
+
+        The sum of the stresses of all plates (Comin and Saaj 2017, eq. 7) at a height (m) and
+        velocity (m/s) of the hub, (cases,). Rates are of both forces by velocity ahead, velocity up
+        and height. Stress depends on the direction of motion, not on its speed; slowly moving
+        plates have it regularised,
+
+        .. math:: \hat v \to v / \sqrt{v^2 + v_0^2}
+
+        because the force on a resting foot would otherwise alternate from step to step.
+        """
+        depth = -(pose[1] + height)
+        reached = np.flatnonzero(np.any((depth > 0.0) & (self.area > 0.0), axis=1))
+        depth = depth[reached]
+        area = np.where(depth > 0.0, self.area[reached], 0.0)
+        x, z, c2, s2 = (part[reached] for part in pose)
+        turns = self.turns[reached]
+        turning = self.speed * turns
+        vx, vz = ahead + turning * z, up - turning * x
+        pace = np.sqrt(vx * vx + vz * vz + (FADING * self.tip_speed) ** 2)
+        ux, uz = vx / pace, vz / pace
+        skin = np.exp(-np.maximum(depth, 0.0) / SKIN)
+        pressure = area * (self.stiffness * depth + self.offset * (1.0 - skin))
+        gradient = area * (self.stiffness + self.offset / SKIN * skin)
+        rest_x, rest_z, xx, xz, zx, zz = resistance_terms(c2, s2)
+        sx, sz = rest_x - xx * ux - xz * uz, rest_z - zx * ux - zz * uz
+        fx, fz = pressure * sx, pressure * sz
+        # the motor works against the motion of the plates about the hub
+        forces = np.stack([fx, fz, -turns * (fx * z - fz * x)]).sum(axis=1)
+        weight = pressure / pace
+        x_x, x_z, z_z = (1.0 - ux * ux) * weight, -ux * uz * weight, (1.0 - uz * uz) * weight
+        rates = np.stack(
+            [
+                [xx * x_x + xz * x_z, xx * x_z + xz * z_z, gradient * sx],
+                [zx * x_x + zz * x_z, zx * x_z + zz * z_z, gradient * sz],
+            ]
+        )
+        return forces, -rates.sum(axis=2)

@@ -110,7 +110,12 @@ def _integrate(
             leg.healing,
         )
     )  # fmt: skip
-    _check_ranges(slip, static, gap)
+    inside = (slip >= 0.0) & (slip <= 1.0) & (gap >= 0.0) & (static >= gap) & (static <= 1.4)
+    if not inside.all():
+        raise InputError(
+            f"slip {slip[~inside][0]:g}, friction_angle {static[~inside][0]:g} and increment "
+            f"{gap[~inside][0]:g} rad; needed are 0 <= slip <= 1, 0 <= increment <= friction <= 1.4"
+        )
     mu_s, mu_d = np.tan(static), np.tan(static - gap)
     loaded_length, dashpot = length - M * GRAVITY / k, 2.0 * zeta * np.sqrt(k * M)
     if not (loaded_length > 0.5 * length).all():
@@ -163,17 +168,3 @@ def _integrate(
         x, slid = x + moved, slid + np.abs(moved)
         mu_top = np.where(stops, mu_healed, mu_top)
         heading = np.where(stops, 0.0, heading)
-
-
-def _check_ranges(slip: Floats, static: Floats, gap: Floats) -> None:
-    """Raise `InputError` for slip or angles outside the range of the model."""
-    for name, value, low, high in (
-        ("slip", slip, 0.0, 1.0),
-        ("friction_angle", static, 0.0, 1.4),
-        ("increment", gap, 0.0, 1.4),
-        ("friction_angle - increment", static - gap, 0.0, 1.4),
-    ):
-        invalid = ~((value >= low) & (value <= high))
-        if invalid.any():
-            wrong = value[invalid].flat[0]
-            raise InputError(f"{name} is {wrong:g}; it must lie between {low:g} and {high:g}")

@@ -103,7 +103,7 @@ class SlipRelation:
                 for c, p, q in self.of_soil)  # fmt: skip
         return a, b
 
-    def soil(self, reading: Real, slip: Real, reading_std: float = 0.0) -> LegSoil:
+    def soil(self, reading: Real, slip: Real) -> LegSoil:
         """Estimate the soil from readings (SI) and slips, one pair (n,) for each stride.
 
         A relation with `single` needs one pair, the others two or more with different slips.
@@ -117,16 +117,16 @@ class SlipRelation:
         >>> [round(float(np.rad2deg(v))) for v in (found.mean[0], found.std[0])]  # degrees
         [40, 6]
         """
-        x, i = _pairs(reading, slip, reading_std)
+        x, i = _pairs(reading, slip)
         if self.single is None:
-            value, covariance = self._regressed(x, i, reading_std)
+            value, covariance = self._regressed(x, i)
         else:
             p, q, r, s = self.single
             rate = r + s * x
             if np.any(rate == 0.0):
                 raise FitError("a reading of zero does not determine the soil; leave that pair out")
             each = (i - p - q * x) / rate
-            information = (rate / np.hypot(self.slip_std, (q + s * each) * reading_std)) ** 2
+            information = (rate / self.slip_std) ** 2
             value = np.asarray([(each * information).sum() / information.sum()])
             covariance = np.asarray([[1.0 / information.sum()]])
         jacobian = self.to_soil[:, 1:]
@@ -140,8 +140,8 @@ class SlipRelation:
             )
         return LegSoil(mean, of_strides, self.errors)
 
-    def _regressed(self, x: Floats, i: Floats, reading_std: float) -> tuple[Floats, Floats]:
-        """Intercept and slope of slip on readings, and their covariance, with errors in both."""
+    def _regressed(self, x: Floats, i: Floats) -> tuple[Floats, Floats]:
+        """Intercept and slope of slip on readings, and their covariance."""
         needed = MIN_RANGE * self.slip_std
         if x.size < 2 or np.ptp(i) < needed or np.ptp(x) == 0.0:
             raise FitError(
@@ -151,11 +151,10 @@ class SlipRelation:
             )
         design = np.column_stack([np.ones_like(x), x])
         line, *_ = np.linalg.lstsq(design, i, rcond=None)
-        noise = self.slip_std**2 + (line[1] * reading_std) ** 2
-        return np.asarray(line), noise * np.linalg.inv(design.T @ design)
+        return np.asarray(line), self.slip_std**2 * np.linalg.inv(design.T @ design)
 
 
-def _pairs(reading: Real, slip: Real, std: float) -> tuple[Floats, Floats]:
+def _pairs(reading: Real, slip: Real) -> tuple[Floats, Floats]:
     x, i = (np.atleast_1d(np.asarray(v, float)) for v in (reading, slip))
     if x.ndim != 1 or x.shape != i.shape or x.size == 0:
         raise InputError(f"{x.size} readings and {i.size} slips are given; needed are pairs")
@@ -166,8 +165,6 @@ def _pairs(reading: Real, slip: Real, std: float) -> tuple[Floats, Floats]:
             f"slip is {i[np.abs(i).argmax()]:g}; it must lie between -1 and 1 (a fraction, not "
             "percent)"
         )
-    if not 0.0 <= std < np.inf:
-        raise InputError(f"the reading's std is {std:g}; needed is a standard deviation, 0 or more")
     return x, i
 
 

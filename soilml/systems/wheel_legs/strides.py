@@ -83,8 +83,6 @@ def soil_of_strides(
     *,
     torque_model: str = "simplified",
     vibration_model: str = "linear",
-    torque_std: float = 0.0,
-    vibration_std: float = 0.0,
 ) -> StrideSoil:
     """Estimate one soil from slip and torque, vibration and sinkage at midstance.
 
@@ -100,8 +98,6 @@ def soil_of_strides(
         them; NaN where not measured.
     torque_model, vibration_model
         Names in `TORQUE_SLIP` and `VIBRATION_SLIP`.
-    torque_std, vibration_std
-        Standard deviations of the sensors, N m and m/s^2.
 
     Raises
     ------
@@ -124,8 +120,8 @@ def soil_of_strides(
     torque = find_relation(torque_model, TORQUE_SLIP)
     vibration = find_relation(vibration_model, VIBRATION_SLIP)
     solve: dict[str, Callable[[Floats, Floats], LegSoil]] = {
-        "torque": lambda value, at: torque.soil(value, at, torque_std),
-        "vibration": lambda value, at: vibration.soil(value, at, vibration_std),
+        "torque": lambda value, at: torque.soil(value, at),
+        "vibration": lambda value, at: vibration.soil(value, at),
         "sinkage": lambda value, _: soil_of_sinkage(value),
     }
     found: dict[str, LegSoil] = {}
@@ -316,8 +312,6 @@ def slip_of_strides(
     *,
     torque_model: str = "simplified",
     vibration_model: str = "linear",
-    torque_std: float = 0.0,
-    vibration_std: float = 0.0,
 ) -> StrideSlip:
     """Slip by the printed relations on a soil of this angle (rad) and stiffness sigma_1 (Pa).
 
@@ -337,22 +331,16 @@ def slip_of_strides(
     >>> found.fused.round(2).tolist(), found.fused_std.round(2).tolist()
     ([0.17], [0.1])
     """
-    if not all(0.0 <= std < np.inf for std in (torque_std, vibration_std)):
-        raise InputError(
-            f"standard deviations of {torque_std:g} N m and {vibration_std:g} m/s^2; needed are 0 "
-            "or more"
-        )
     relations = {
-        "torque": (find_relation(torque_model, TORQUE_SLIP), torque_std),
-        "vibration": (find_relation(vibration_model, VIBRATION_SLIP), vibration_std),
+        "torque": find_relation(torque_model, TORQUE_SLIP),
+        "vibration": find_relation(vibration_model, VIBRATION_SLIP),
     }
     found, std = {}, {}
-    for name, (relation, noise) in relations.items():
+    for name, relation in relations.items():
         if name in readings and np.isfinite(value := np.asarray(readings[name], float)).any():
             a, b = relation.line(friction_angle, normal_stiffness)
             found[name] = np.asarray(a + b * value)
-            error = float(np.hypot(relation.slip_std, b * noise))
-            std[name] = np.where(np.isfinite(value), error, np.nan)
+            std[name] = np.where(np.isfinite(value), relation.slip_std, np.nan)
     if not found:
         raise InputError("nothing was measured: give torque or vibration of each stride")
     mean, each = (np.stack(list(values.values())) for values in (found, std))

@@ -10,9 +10,7 @@ import numpy as np
 
 from soilml.arrays import Array, Real
 from soilml.errors import InputError
-from soilml.systems.wheel_legs.geometry import WheelLeg
-from soilml.systems.wheel_legs.ground_reaction import WalkingLegs
-from soilml.systems.wheel_legs.resistive_force import LinearGround
+from soilml.systems.wheel_legs.resistive_force import LinearGround, WalkingLegs, WheelLeg
 
 GRAVITY = 9.81
 TOLERANCE = 1e-6  # A step has converged when the forces balance to this fraction of the weight
@@ -34,25 +32,19 @@ class WalkStatus(IntEnum):
     """Status of a case of a batch."""
 
     OK = 0
-    INVALID = 1
-    NO_CONTACT = 2
-    SUNK = 3
-    NOT_CONVERGED = 4
+    NO_CONTACT = 1
+    SUNK = 2
+    NOT_CONVERGED = 3
 
     @property
     def reason(self) -> str:
         """Description of the status."""
-        return _REASONS[self]
-
-
-_REASONS: dict[WalkStatus, str] = {
-    WalkStatus.OK: "ok",
-    WalkStatus.INVALID: "no walk: the wheel-leg, the ground or the commanded slip is invalid",
-    WalkStatus.NO_CONTACT: "no walk: no leg ever reaches the ground; the legs are shorter than the "
-    "clearance of the body",
-    WalkStatus.SUNK: "stopped: the ground is too soft, the hub reaches its surface",
-    WalkStatus.NOT_CONVERGED: "stopped: no motion of the hub satisfies the force balance",
-}
+        return (
+            "ok",
+            "no walk: no leg ever reaches the ground; they are shorter than the body's clearance",
+            "stopped: the ground is too soft, the hub reaches its surface",
+            "stopped: no motion of the hub satisfies the force balance",
+        )[self]
 
 
 @dataclass(frozen=True)
@@ -141,7 +133,7 @@ def walk(
     turns
         Duration in turns of the wheel.
     steps
-        Steps per turn, at least 100.
+        Steps per turn, such as 1000.
 
     Returns
     -------
@@ -151,7 +143,7 @@ def walk(
     Raises
     ------
     InputError
-        For invalid settings, or numbers of cases that do not match.
+        For numbers of cases that do not match, and slips beyond 1.
 
     References
     ----------
@@ -166,49 +158,23 @@ def walk(
     >>> [round(float(metrics[name][0]), 2) for name in ("slip_mean", "sinkage_mean_m")]
     [0.25, 0.06]
     """
-    if not (steps >= 100 and 0.0 < turns < np.inf):
-        raise InputError(
-            f"steps {steps}, turns {turns:g}: a walk needs at least 100 steps per turn, and turns "
-            "above 0"
-        )
     wheels = [wheel_legs] if isinstance(wheel_legs, WheelLeg) else list(wheel_legs)
     under = [grounds] if isinstance(grounds, LinearGround) else list(grounds)
     slips = np.atleast_1d(np.asarray(np.nan if slip is None else slip, float))
     cases = max(len(wheels), len(under), slips.size)
-    if min(len(wheels), len(under), slips.size) == 0:
-        raise InputError("no case to walk: give at least one wheel-leg and one ground")
-    for name, size in (("wheel-legs", len(wheels)), ("grounds", len(under)), ("slips", slips.size)):
-        if size not in (1, cases):
-            raise InputError(f"{size} {name} for {cases} cases: give one, or one for each case")
+    if {len(wheels), len(under), slips.size} - {1, cases} or np.any(np.abs(slips) > 1.0):
+        raise InputError(
+            f"{len(wheels)} wheel-legs, {len(under)} grounds and {slips.size} slips for {cases} "
+            "cases: give one, or one for each case, with slips from -1 to 1"
+        )
     wheels, under = wheels * (cases // len(wheels)), under * (cases // len(under))
-    slips = np.broadcast_to(slips, (cases,))
-    invalid = [
-        bool(wheel.invalid_reason or ground.invalid_reason or abs(s) > 1.0)
-        for wheel, ground, s in zip(wheels, under, slips, strict=True)
-    ]
-    status = np.where(invalid, int(WalkStatus.INVALID), int(WalkStatus.OK))
+    legs = WalkingLegs.of(wheels, under, np.broadcast_to(slips, (cases,)))
     count = round(turns * steps) + 1
-    history = np.full((5, count, cases), np.nan)
-    valid = np.flatnonzero(~np.asarray(invalid))
-    if valid.size:
-        legs = WalkingLegs.of([wheels[i] for i in valid], [under[i] for i in valid], slips[valid])
-        status[valid], history[:, :, valid] = _simulated(legs, count, 2.0 * np.pi / steps)
+    status, (x, z, vx, vz, torque) = _simulated(legs, count, 2.0 * np.pi / steps)
     angle = 2.0 * np.pi / steps * np.arange(count)
-    speed = np.array([np.nan if w.invalid_reason else w.speed for w in wheels])
-    x, z, vx, vz, torque = history
-    return Walk(
-        time=angle[:, None] / speed,
-        angle=angle,
-        x=x,
-        z=z,
-        vx=vx,
-        vz=vz,
-        torque=torque,
-        status=status,
-        length=np.array([w.leg.length for w in wheels]),
-        legs=np.array([max(w.legs, 1) for w in wheels]),
-        speed=speed,
-    )
+    length = np.array([w.leg.length for w in wheels])
+    time = angle[:, None] / legs.speed
+    return Walk(time, angle, x, z, vx, vz, torque, status, length, legs.legs, legs.speed)
 
 
 def _simulated(legs: WalkingLegs, count: int, step: float) -> tuple[Array, Array]:

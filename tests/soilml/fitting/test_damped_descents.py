@@ -9,9 +9,9 @@ from soilml.fitting import damped_descents
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.damped_descents import (
     bounded_steps,
+    descend,
     descend_together,
     in_step,
-    levenberg_marquardt,
 )
 from soilml.fitting.least_squares import LeastSquaresProblem
 from soilml.fitting.readings import stack_readings
@@ -30,9 +30,9 @@ def test_a_fit_follows_the_valley_of_bearing_modulus_and_exponent():
     case = case_of(MODEL.replace("[noise]", bearing))
     own = of_soil(case, driven(case, seed=1))
     truth = [c.prior.fraction(float(getattr(case.soil, c.path))) for c in own.coordinates]
-    best = levenberg_marquardt(own, np.asarray(truth))
+    best = descend(own, np.asarray(truth))
     for start in (np.full(5, 0.5), np.asarray([0.5, 0.5, 0.3, 0.06, 0.2])):
-        found = levenberg_marquardt(own, start)
+        found = descend(own, start)
         assert found.converged
         assert found.objective == pytest.approx(best.objective, abs=0.2)
 

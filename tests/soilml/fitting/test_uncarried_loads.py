@@ -8,7 +8,7 @@ import pytest
 from soilml import Operating, identify, read_case
 from soilml.cli.main import main
 from soilml.errors import FitError
-from soilml.fitting.uncarried_loads import missing_peak, raise_uncarried
+from soilml.fitting.global_optimum import missing_peak, raise_uncarried
 from soilml.io.table import Table
 
 SAID = r"a0 \+ a1 slip is 0 at slip 0\.1, and must be above 0 and below 1; change a0 or a1"

@@ -7,34 +7,29 @@ import pytest
 from gap_sets import case_of, driven
 
 from soilml.errors import InputError
-from soilml.fitting.effect_signatures import Signature
 from soilml.gap import audit
-from soilml.gap.design.identifiability import (
+from soilml.gap.identifiability import (
     NAMEABLE_SIGMA,
     identifiability,
     indistinguishable_classes,
 )
 from soilml.physics.effects import EFFECTS
 
-STD = np.asarray([0.5, 1.0, 1.0, 1.0, 1.0])
-#: The soil can change the first reading alone, which is whitened.
+#: The soil can change the first reading alone.
 SOIL = np.asarray([[1.0], [0.0], [0.0], [0.0], [0.0]])
 
 
-def signature(name, *column):
-    return Signature(name, EFFECTS[name].about.kind, np.asarray(column), 0)
-
-
-SIGNATURES = [
-    signature("slip-sinkage", 2.0, 3.0, 0.0, 0.0, 0.0),  # in sigma: 4, 3, of which 3 is left
-    signature("grousers", 0.0, 4.0, 3.0, 0.0, 0.0),  # 5, at a cosine of 0.8 to the first
-    signature("bulldozing", 0.0, 0.0, 0.0, 12.0, 0.0),
-    signature("exit-angle", 1.5, 0.0, 0.0, 0.0, 0.0),  # what the soil does as well
-]
+#: Changes of whitened readings.
+SIGNATURES = {
+    "slip-sinkage": np.asarray([4.0, 3.0, 0.0, 0.0, 0.0]),  # of which 3 is left
+    "grousers": np.asarray([0.0, 4.0, 3.0, 0.0, 0.0]),  # 5, at a cosine of 0.8 to the first
+    "bulldozing": np.asarray([0.0, 0.0, 0.0, 12.0, 0.0]),
+    "exit-angle": np.asarray([3.0, 0.0, 0.0, 0.0, 0.0]),  # what the soil does as well
+}
 
 
 def test_figures_of_a_design_by_hand():
-    dug, lugs, ploughed, left = identifiability(SIGNATURES, STD, SOIL, EFFECTS)
+    dug, lugs, ploughed, left = identifiability(SIGNATURES, SOIL, EFFECTS)
     assert (dug.signal, dug.residual_signal) == (pytest.approx(5.0), pytest.approx(3.0))
     assert dug.absorbed == pytest.approx(1.0 - 9.0 / 25.0)
     assert dug.rivals[0] == ("grousers", pytest.approx(0.8))
@@ -45,30 +40,28 @@ def test_figures_of_a_design_by_hand():
     assert lugs.separating_snr == pytest.approx(5.0 * 0.6) and lugs.absorbed == pytest.approx(0.0)
     assert ploughed.separating_snr == pytest.approx(12.0)
     assert left.detectable_size == float("inf") and left.signal == pytest.approx(3.0)
-    assert identifiability([], STD, SOIL, EFFECTS) == []
+    assert identifiability({}, SOIL, EFFECTS) == []
 
 
 @pytest.mark.parametrize("factor, alike", [(1.0, True), (1.2, False)])
 def test_effects_are_alike_where_two_sigma_tell_them_apart(factor, alike):
     """The weaker of the first two leaves 1.8 sigma, and 2.2 where it is 1.2 times as large."""
-    stronger = [
-        signature(s.name, *(factor * s.column if s.name == "slip-sinkage" else s.column))
-        for s in SIGNATURES
-    ]
-    found = indistinguishable_classes(stronger, STD, SOIL)
+    stronger = SIGNATURES | {"slip-sinkage": factor * SIGNATURES["slip-sinkage"]}
+    found = indistinguishable_classes(stronger, SOIL)
     assert found == ((("slip-sinkage", "grousers"),) if alike else ())
-    assert indistinguishable_classes([], STD, SOIL) == ()
+    assert indistinguishable_classes({}, SOIL) == ()
 
 
 def test_classes_are_joined_by_a_common_member():
-    chain = [
-        signature("rate", 0.0, 4.0, 1.0, 0.0, 0.0),
-        signature("slope", 0.0, 4.0, -1.0, 0.0, 0.0),
-        signature("multipass", 0.0, 4.0, 0.0, 0.0, 0.0),
-        signature("bulldozing", 0.0, 0.0, 0.0, 1.5, 0.0),  # below two sigma: in no class
-        signature("exit-angle", 0.0, 0.0, 0.0, 1.4, 0.0),
-    ]
-    assert indistinguishable_classes(chain, STD, SOIL) == (("rate", "slope", "multipass"),)
+    chain = {
+        "rate": [0.0, 4.0, 1.0, 0.0, 0.0],
+        "slope": [0.0, 4.0, -1.0, 0.0, 0.0],
+        "multipass": [0.0, 4.0, 0.0, 0.0, 0.0],
+        "bulldozing": [0.0, 0.0, 0.0, 1.5, 0.0],  # below two sigma: in no class
+        "exit-angle": [0.0, 0.0, 0.0, 1.4, 0.0],
+    }
+    chain = {name: np.asarray(column) for name, column in chain.items()}
+    assert indistinguishable_classes(chain, SOIL) == (("rate", "slope", "multipass"),)
 
 
 @pytest.fixture(scope="module")

@@ -1,15 +1,16 @@
-"""Rows held out before an analysis, soil that is free, and other gears that are proposed."""
+"""Rows held out before an analysis, soil that is free, and a smooth gear."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_sets import case_of
+from gap_sets import case_of, driven
 
 from soilml.errors import InputError
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
-from soilml.gap.design.run_options import LUG_EFFECTS, gear_changes
-from soilml.gap.evidence.holdout_split import split_holdout
+from soilml.fitting.readings import stack_readings
+from soilml.gap.held_out import split_holdout
+from soilml.gap.run_options import run_options
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 
@@ -70,34 +71,13 @@ def test_a_soil_parameter_is_free_or_fixed():
         free_soil_parameters(case, ["cohesion", "gear.radius"])
 
 
-def changes(case, *names):
-    return {c.kind: c for c in gear_changes(case, [EFFECTS[name] for name in names])}
-
-
-def test_another_gear_is_proposed_for_the_effects_that_it_tells_apart():
-    case = case_of()
-    gear = case.model.gear
-    narrow = changes(case, "sidewall-shear")["narrower gear"]
-    assert narrow.size == pytest.approx(0.5 * gear.width, rel=0.05)
-    assert narrow.columns() == {"wheel_width_m": narrow.size} and narrow.removed == frozenset()
-    assert narrow.text == f"a width of {narrow.size:g} m"
-    assert narrow.apply(case).model.gear.width == narrow.size
-    assert narrow.apply(case).model.gear.radius == gear.radius
-    large = changes(case, "stress-shift")["larger wheel"]
-    assert large.size == pytest.approx(1.5 * gear.radius, rel=0.05)
-    assert large.columns() == {"wheel_radius_m": large.size}
-    assert changes(case, "slip-sinkage") == {}
-    assert set(changes(case, "sidewall-shear", "stress-shift")) == {"narrower gear", "larger wheel"}
-
-
 def test_a_smooth_gear_has_no_lugs_and_all_else():
     case = case_of()
+    readings = stack_readings(case, driven(case))
     lugged = replace(case, model=case.model + EFFECTS["grousers"]() + EFFECTS["slip-sinkage"]())
-    (smooth,) = changes(lugged, "grousers").values()
-    assert (smooth.kind, smooth.text) == ("smooth gear", "lugs removed or covered")
-    assert smooth.removed == LUG_EFFECTS and smooth.columns() == {"grouser_height_m": 0.0}
-    left = [effect.name for effect in smooth.apply(lugged).model.effects]
-    assert left == [e.name for e in lugged.model.effects if e.name != "grousers"]
-    assert "slip-sinkage" in left
-    several = replace(case, gears={"own": case.model})
-    assert changes(several, "grousers", "stress-shift") == {}
+    (smooth,) = (o for o in run_options(readings, lugged, ["grousers"]) if o.smooth)
+    assert smooth.kind == "smooth gear" and smooth.text.startswith("the same slips with lugs")
+    assert [e.name for e in smooth.changed(lugged).model.effects] == ["slip-sinkage"]
+    assert not any(o.smooth for o in run_options(readings, lugged, ["slip-sinkage"]))
+    several = replace(lugged, gears={"a": lugged.model, "b": lugged.model})
+    assert not any(o.smooth for o in run_options(readings, several, ["grousers"]))

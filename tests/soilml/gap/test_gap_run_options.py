@@ -7,7 +7,7 @@ import pytest
 from gap_sets import case_of, driven
 
 from soilml.fitting.readings import stack_readings
-from soilml.gap.design.run_options import _unvaried, run_options
+from soilml.gap.run_options import _unvaried, run_options
 
 CASE = case_of()
 
@@ -105,7 +105,7 @@ def test_slips_of_an_own_are_proposed_where_hardly_any_were_driven():
 @pytest.mark.parametrize("most, load", [(140.0, 135.0), (120.0, 112.0), (100.0, None)])
 def test_of_two_heavier_loads_the_first_that_the_soil_carries_is_proposed(monkeypatch, most, load):
     monkeypatch.setattr(
-        "soilml.gap.design.run_options.carried_rows", lambda case, at: np.asarray(at.load) < most
+        "soilml.gap.run_options.carried_rows", lambda case, at: np.asarray(at.load) < most
     )
     found = options()
     assert ("heavier" in found) == (load is not None)
@@ -116,7 +116,7 @@ def test_of_two_heavier_loads_the_first_that_the_soil_carries_is_proposed(monkey
 @pytest.mark.parametrize("rows, proposed", [(2, False), (3, True)])
 def test_rows_that_the_soil_does_not_carry_are_left_out(monkeypatch, rows, proposed):
     monkeypatch.setattr(
-        "soilml.gap.design.run_options.carried_rows",
+        "soilml.gap.run_options.carried_rows",
         lambda case, at: np.arange(len(at.slip)) < rows,
     )
     found = options()

@@ -10,16 +10,16 @@ from gap_sets import case_of, remark
 from remarked import remarked
 
 from soilml.config.measurement_noise import Discrepancy
-from soilml.gap.report.listed_explanations import _odds
-from soilml.gap.report.remainder_cause import RemainderCause
-from soilml.gap.report.results import (
+from soilml.gap.conclusions import unsupported_conclusions
+from soilml.gap.results import (
     GapReduction,
     GapReport,
     NoiseAgreement,
+    RemainderCause,
     RemainingDiscrepancy,
     Suspect,
 )
-from soilml.gap.report.sentences import headline, report_lines, unsupported_conclusions
+from soilml.gap.sentences import _odds, headline, report_lines
 from soilml.remarks import Remark, texts
 
 FIGURES = {"train": GapReduction(8.8, 1.1, {}, 96, "all rows fitted")}

@@ -9,9 +9,7 @@ from gap_sets import analysed, case_of, driven, hidden
 from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.plans import Plan
 from soilml.gap import gap
-from soilml.gap.report.listed_explanations import next_run_in_words
-from soilml.gap.report.reasons_in_short import SENTENCE_WORDS
-from soilml.gap.report.results import (
+from soilml.gap.results import (
     STATUSES,
     GapReduction,
     GapReport,
@@ -19,7 +17,14 @@ from soilml.gap.report.results import (
     NextRun,
     Suspect,
 )
-from soilml.gap.report.sentences import HEADLINE_WORDS, MOST_LINES, headline, report_lines
+from soilml.gap.sentences import (
+    HEADLINE_WORDS,
+    MOST_LINES,
+    SENTENCE_WORDS,
+    headline,
+    next_run_in_words,
+    report_lines,
+)
 from soilml.io.table import Table
 from soilml.remarks import Remark, texts
 

@@ -31,9 +31,7 @@ def answers(report):
     """Everything that is found, without the figures on rows held out."""
     content = report.as_json()
     content["gap"] = {k: v for k, v in content["gap"].items() if "held out" not in v["description"]}
-    content["notes"] = [
-        r for r in content["notes"] if r["code"] not in ("not-reduced", "channel-grows")
-    ]
+    content["notes"] = [r for r in content["notes"] if r["code"] != "not-reduced"]
     content["not_claimed"] = [r for r in content["not_claimed"] if "held out" not in r["text"]]
     return content
 

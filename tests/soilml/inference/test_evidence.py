@@ -8,7 +8,7 @@ import pytest
 from gap_sets import LOADS, MODEL, case_of, driven
 
 from soilml.fitting.coordinates import select_free
-from soilml.fitting.damped_descents import levenberg_marquardt
+from soilml.fitting.damped_descents import descend
 from soilml.fitting.least_squares import LeastSquaresProblem
 from soilml.fitting.readings import stack_readings
 from soilml.inference.conditional import conditional, leave_one_out
@@ -33,7 +33,7 @@ def model(text=MODEL, autocorrelation=0.0, outlier=False, loads=LOADS):
     own = LeastSquaresProblem(
         case, tuple(select_free(case, None)), readings, terms.whiten(at, strays)
     )
-    fit = levenberg_marquardt(own, np.full(3, 0.4))
+    fit = descend(own, np.full(3, 0.4))
     return linear_model(terms, own.linearised(np.minimum(fit.x + 0.01, 0.99)), strays), at
 
 

@@ -14,7 +14,7 @@ from soilml.errors import SoilmlError
 from soilml.log_import import init_map
 from soilml.log_import.channels.inputs import wheel_inputs
 from soilml.log_import.channels.runs import runs_of
-from soilml.log_import.channels.wheel_quantities import constants_of
+from soilml.log_import.channels.wheel_quantities import Conversion
 from soilml.log_import.mapping.log_map import map_from
 from soilml.log_import.readers import read_log
 from soilml.optional_imports import tomllib
@@ -72,7 +72,7 @@ def judged(logs, truth: Truth, text=None):
                 values = inputs.values.get(key)
                 if values is None:
                     values = np.full(inputs.time.size, inputs.constants.get(key, np.nan))
-                ratio = constants_of(wheel, None).get(f"{role}.gear_ratio")
+                ratio = Conversion(wheel, None).constants.get(f"{role}.gear_ratio")
                 values = values / (ratio.value if ratio else 1.0)
                 right = same(inputs.time, values, truth, true)
         elif right:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from soilml.errors import InputError, MissingLibraryError, SoilmlError
-from soilml.log_import.readers import message_fields, read_log, text_by_arrow
+from soilml.log_import.readers import delimited_text, message_fields, read_log
 from soilml.remarks import texts
 
 PLAIN = "t,F,M\n0.0,1.5,-2\n0.1,1.6,-3\n0.2,,-4\n0.3,1.8,-5\n0.4,1.9,-6\n"
@@ -17,8 +17,6 @@ SEMICOLON = PLAIN.replace(",", ";").replace(".", ",")
         PLAIN.encode(),
         b"\xef\xbb\xbf" + PLAIN.encode(),
         PLAIN.encode("utf-16"),
-        PLAIN.encode("utf-16-le"),
-        PLAIN.encode("utf-16-be"),
         PLAIN.replace("\n", "\r\n").encode(),
         PLAIN.replace(",", "\t").encode(),
         SEMICOLON.encode("utf-16"),
@@ -164,7 +162,7 @@ def test_a_long_log_of_numbers_is_read_as_its_lines_are(mark, tmp_path):
 
 def test_a_log_that_memory_has_no_room_for_is_thinned(tmp_path, monkeypatch):
     """Text and messages: evenly over the whole, and said."""
-    for module in (text_by_arrow, message_fields):
+    for module in (delimited_text, message_fields):
         monkeypatch.setattr(module, "KEPT_VALUES", 12_000)
     t = np.arange(20_000) / 1000
     lines = ["t,run,v", *(f"{x:.3f},{'ab'[int(x > 10)]},{x * x:.4f}" for x in t)]

@@ -7,8 +7,7 @@ import pytest
 from simulated_rig import wandering
 
 from soilml.log_import.windows.change_points import change_points, steady_pieces
-from soilml.log_import.windows.mean_errors import mean_error
-from soilml.log_import.windows.slip_errors import travel_ratio
+from soilml.log_import.windows.mean_errors import mean_error, travel_ratio
 
 
 def test_change_points_are_the_exact_optimum():

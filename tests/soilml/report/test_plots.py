@@ -10,7 +10,7 @@ from conftest import MODEL
 from soilml import Estimator, Table, identify, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
-from soilml.gap.report.results import GapReduction, GapReport
+from soilml.gap.results import GapReduction, GapReport
 from soilml.traction.report import pull_report
 
 matplotlib = pytest.importorskip("matplotlib")

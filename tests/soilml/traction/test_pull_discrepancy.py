@@ -8,8 +8,7 @@ import pytest
 from soilml import Operating, read_case
 from soilml.config.measurement_noise import Discrepancy, Noise
 from soilml.io.table import Table
-from soilml.traction.draws import SoilDraws
-from soilml.traction.model_errors import draw_model_errors
+from soilml.traction.draws import SoilDraws, draw_model_errors
 from soilml.traction.pull_and_slope import predict_traction
 
 NAMES = ("cohesion", "friction_angle", "shear_modulus")

@@ -8,13 +8,15 @@ import pytest
 from scipy.integrate import quad
 
 from soilml import ExitAngle, Model, Operating, StressShift, Wheel, soil
-from soilml.systems.rim_stress import (
-    StressProfile,
+from soilml.systems.rim_stress import StressProfile
+from soilml.systems.rim_stress.force_balance import (
     find_modulus,
     force_components,
-    parabolic_arc,
+    force_of,
+    magnification,
+    pull_under,
 )
-from soilml.systems.rim_stress.force_balance import force_of, magnification, pull_under
+from soilml.systems.rim_stress.simulation import parabolic_arc
 
 PHI, TRUE = math.radians(38.0), 0.0072
 RIM = (0.055, 0.064)

@@ -8,24 +8,10 @@ import pytest
 from soilml import Model, Operating, soil
 from soilml.systems.tracked_robot.robot import (
     WANG2018,
-    settling_from_moments,
     track_balance,
 )
 
 SAND, CLAY = soil("wang2018/sand"), soil("wang2018/clay")
-
-
-def test_the_rear_sinks_under_pull_where_moments_balance_and_not_at_constant_trim():
-    """Wang et al. 2018, Fig. 12f: sinkage and inclination rise with the pull."""
-    at = Operating(slip=np.asarray([0.02, 0.2, 0.5]), load=WANG2018.load)
-
-    def rear(track):
-        sunk = Model(track)(SAND, at).sinkage
-        return sunk + track.base * np.sin(track.contact_geometry(sunk, SAND, at).trim)
-
-    assert (np.diff(rear(WANG2018.track)) < 0.0).all()
-    settling = settling_from_moments(Model(WANG2018.track), SAND, at, hitch=0.1)
-    assert (np.diff(rear(replace(WANG2018.track, settling=settling))) > 1e-4).all()
 
 
 def test_the_parts_of_a_track_carry_the_load_together():

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from soilml.systems.wheel_legs import (
-    GROUNDS,
+from soilml.systems.wheel_legs import mobility, soil_of_strides
+from soilml.systems.wheel_legs.resistive_force import GROUNDS
+from soilml.systems.wheel_legs.stride_relations import (
+    ASSUMED_SPRING,
+    GRAVITY,
     TORQUE_SLIP,
     VIBRATION_SLIP,
-    mobility,
-    soil_of_strides,
     soil_spring,
     spring_soil,
 )
-from soilml.systems.wheel_legs.stride_relations import ASSUMED_SPRING, GRAVITY
 
 ANGLE, STIFFNESS = 0.7, 1.6e4
 SLIPS = np.asarray([0.0, 0.125, 0.25, 0.375, 0.5])

@@ -1,0 +1,240 @@
+"""Decision: which status the posterior supports."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from soilml.fitting.least_squares import Solution
+from soilml.gap.results import Suspect
+from soilml.gap.sentences import NOT_DECISIVE
+from soilml.inference import constants
+from soilml.inference.explanation import Explanation
+from soilml.inference.posterior import Names, Posterior
+from soilml.quantities import column
+from soilml.remarks import Remark
+
+LISTED_SUSPECTS = 8  # Suspects that are listed
+#: Why an explanation that the evidence supports is not claimed, by codes.
+_DOUBTS = {
+    "implausible-fault": "{} would explain the gap, but would have to be implausibly large for a "
+    "fault of a sensor or of the rig: check that first",
+    "implausible-size": "{} would have to be far larger than it usually is, so that its law or the "
+    "cause is another one",
+    "not-predictive": "{} fits the rows, but beside a smooth remainder, it predicts rows that were "
+    "kept back no better than the soil alone does",
+    "other-law": "the law of {} would have to differ much from that of the catalogue, so that the "
+    "cause may be one that the catalogue lacks",
+    "unchecked-fault": "{} explains the gap, but what looks like a fault of a sensor or of the rig "
+    "may be a law that the catalogue lacks: check it, and state the check with --checked",
+}
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The status, the sets of effects it claims, and the one whose figures are shown."""
+
+    status: str
+    claimed: tuple[Names, ...] = ()  # the sets that are stated as causes
+    listed: tuple[Names, ...] = ()  # those that the data do not reject, the first suspect first
+    shown: Explanation | None = None  # that of the first one; None where nothing is suspected
+    reason: Remark | None = None  # why what the evidence supports is not claimed
+
+
+def ranked_sets(posterior: Posterior) -> list[Names]:
+    """Sets of effects by the probability that they are present, alone or with others.
+
+    The first one has all effects that are likelier than not.
+
+    References: Barbieri and Berger, Optimal predictive model selection, Annals of Statistics 32,
+    2004: of single models, that of these effects predicts best under usual conditions.
+    """
+    fitted = {node.hypothesis.effects for node in posterior.nodes}
+    sets = [names for names in posterior.sets if names and names in fitted]
+    if not sets:
+        return []
+    p = {names: posterior.probability(*names) for names in sets}
+    best = max(sets, key=lambda names: (p[names] > 0.5) * len(names) + p[names])
+    rest = sorted((names for names in sets if names != best), key=lambda names: -p[names])
+    return [best, *rest]
+
+
+def not_rejected(posterior: Posterior, ranked: Sequence[Names]) -> tuple[Names, ...]:
+    """The smallest sets whose probability is within reach of the likeliest, the first one first."""
+    if not ranked:
+        return ()
+    sets, first = posterior.sets, ranked[0]
+    least = constants.REJECTED * max(sets[names] for names in ranked)
+    kept = [first, *(n for n in ranked[1:] if sets[n] >= least and not set(first) < set(n))]
+    return tuple(n for n in kept if not any(set(other) < set(n) for other in kept))
+
+
+def decide(
+    posterior: Posterior,
+    gains: Mapping[Names, float],
+    obstacles: Sequence[Remark],
+    disagreements: Sequence[Remark],
+) -> Decision:
+    """The status of a report; see `soilml.gap.results.STATUSES`.
+
+    gains: Log density of rows kept back by the first sets, above that of the soil alone.
+    obstacles: Why these runs cannot identify a cause.
+    disagreements: Measurements that disagree with each other, which forbid a verdict without a gap.
+    """
+    none = posterior.no_effect
+    if posterior.no_gap > constants.NO_GAP:
+        return Decision("undecided" if disagreements else "no-gap")
+    ranked = ranked_sets(posterior)
+    chance = posterior.probability(*ranked[0]) if ranked else 0.0
+    if _is_other_soil(posterior) and none > max(constants.UNCERTAIN, chance):
+        return Decision("undecided")
+    hopeless = constants.HOPELESS if obstacles else 0.0
+    if not ranked or (none > constants.UNCERTAIN and none > max(chance, hopeless)):
+        return Decision("not-testable" if obstacles else "unknown")
+    listed = not_rejected(posterior, ranked)
+    best = listed[0]
+    node = posterior.node_of(best)
+    assert node is not None
+    suspected = Decision("suspected", (), listed, node)
+    if obstacles:
+        return suspected
+    if reason := _doubt(posterior, node, gains.get(best, np.inf)):
+        return replace(suspected, reason=reason)
+    if none > constants.UNCERTAIN:
+        return replace(suspected, reason=NOT_DECISIVE)
+    if chance >= constants.NAMED_PROBABILITY:
+        if unchecked := _unchecked_faults(posterior, best):
+            return replace(suspected, reason=_reason("unchecked-fault", unchecked))
+        status = "named"
+        if node.share_without < 0.5:
+            status = "partly-named"
+        elif node.hypothesis.free_law and law_matters(posterior, node):
+            status = "form-open"
+        return Decision(status, (best,), listed[:1], node)
+    together = sum(posterior.sets[names] for names in listed)
+    if none <= constants.CHANCE and len(listed) > 1 and together >= constants.CLASS_PROBABILITY:
+        return Decision("class", listed, listed, node)
+    return replace(suspected, reason=NOT_DECISIVE)
+
+
+def _is_other_soil(posterior: Posterior) -> bool:
+    """Whether the soil alone is likeliest outside its priors, without a discrepancy."""
+    alone = next((n for n in posterior.nodes if not n.hypothesis.effects), None)
+    return alone is not None and alone.hypothesis.wide_priors and alone.share_without > 0.5
+
+
+def _reason(code: str, names: Names) -> Remark:
+    return Remark(code, _DOUBTS[code].format(" + ".join(names)), names)
+
+
+def _doubt(posterior: Posterior, node: Explanation, gain: float) -> Remark | None:
+    """Why an explanation is not claimed, whatever its probability is."""
+    names = node.hypothesis.effects
+    if faults := implausible_faults(node.fit):
+        return _reason("implausible-fault", faults)
+    if implausible_sizes(node.fit):
+        return _reason("implausible-size", names)
+    if not gain > 0.0:
+        return _reason("not-predictive", names)
+    amplitude = posterior.terms.amplitude(node.at)
+    if amplitude.max(initial=0.0) >= constants.LARGE_REMAINDER:
+        left = posterior.terms.readings.channels[int(np.argmax(amplitude))]
+        text = f"beside {' + '.join(names)}, at least four times the usual error of a model is left"
+        text += f" in the {left.replace('_', ' ')}"
+        return Remark("not-catalogued", text, (*names, column(left)))
+    if posterior.by_other_law(node.hypothesis):
+        return _reason("other-law", names)
+    return None
+
+
+def _unchecked_faults(posterior: Posterior, names: Names) -> tuple[str, ...]:
+    """The faults of sensors and rig among effects, of which no check says how large they can be.
+
+    An offset of one channel imitates what no catalogue has, such as a crust on the soil: rows alone
+    do not show a fault, a check of the sensor does.
+    """
+    problem = posterior.problem
+    kinds = {name: problem.effects[name].about.kind for name in names}
+    return tuple(n for n in names if kinds[n] in ("sensor", "rig") and n not in problem.calibration)
+
+
+def implausible_faults(fit: Solution) -> tuple[str, ...]:
+    """Faults of sensors and the rig that are far larger than their priors allow."""
+    deviation = np.abs(fit.x) * np.sqrt(fit.precision)
+    return tuple(
+        c.effect
+        for c, d in zip(fit.coordinates, deviation, strict=True)
+        if c.effect and not c.is_shape and d > constants.MAX_SIZE_DEVIATION
+    )
+
+
+def implausible_sizes(fit: Solution) -> dict[str, float]:
+    """Sizes, in usual ones, of the effects of soil and gear that are far larger, by name."""
+    return {
+        c.effect: float(abs(x))
+        for c, x in zip(fit.coordinates, fit.x, strict=True)
+        if c.effect and not c.is_shape and np.isinf(c.std) and abs(x) > constants.LARGEST_SIZE
+    }
+
+
+def suspects(
+    posterior: Posterior, decision: Decision, gains: Mapping[Names, float]
+) -> list[Suspect]:
+    """Explanations with their odds against all others, the first one that is shown first."""
+    ranked = ranked_sets(posterior)
+    first = decision.listed[:1] or tuple(ranked[:1])
+    rest = [n for n in ranked if posterior.within(n) > constants.LEAST_SUSPECTED]
+    rest = [n for n in rest if not any(set(n) <= set(o) or set(o) < set(n) for o in first)]
+    found = []
+    for names in [*first, *rest[: LISTED_SUSPECTS - 1]]:
+        node, odds = posterior.node_of(names), posterior.log_odds(*names)
+        sizes = {} if node is None else implausible_sizes(node.fit)
+        chance = posterior.probability(*names)
+        found.append(Suspect(names, odds, chance, gains.get(names), sizes))
+    return found
+
+
+def reasons(
+    decision: Decision, obstacles: Sequence[Remark], disagreements: Sequence[Remark]
+) -> tuple[Remark, ...]:
+    """Why no cause can be named, or why the absence of a gap is not stated.
+
+    Of the replicate rows that disagree, the worst are named beside the suspects, because no
+    suspect explains their difference.
+    """
+    if decision.status == "undecided":
+        return tuple(disagreements)
+    own = (decision.reason,) if decision.reason else ()
+    if decision.status == "not-testable":
+        return tuple(obstacles)
+    if decision.status != "suspected":
+        return own
+    why = (*obstacles, *own)
+    if not disagreements:
+        return why
+    worst = replace(disagreements[0], text=f"replicate rows disagree: {disagreements[0]}")
+    return (*(why or (NOT_DECISIVE,)), worst)
+
+
+def law_matters(posterior: Posterior, node: Explanation) -> bool:
+    """Whether the free law and the catalogue's differ in the measured range by more than matters.
+
+    They differ if, in some channel, the root mean square difference of their predictions exceeds
+    both the standard error of a mean over the readings of that channel and the range of the channel
+    times `constants.NEGLIGIBLE_FRACTION`. Without a fit of the catalogue's law they do.
+    """
+    readings, own = posterior.terms.readings, node.hypothesis
+    catalogue = posterior.search.nodes.get(replace(own, free_law=False))
+    if catalogue is None:
+        return True
+    difference = node.fit.prediction - catalogue.fit.prediction
+    for i in range(len(readings.channels)):
+        in_channel = readings.channel == i
+        rms = np.sqrt(np.mean(difference[in_channel] ** 2))
+        mean_error = np.sqrt(np.mean(posterior.std[in_channel] ** 2) / in_channel.sum())
+        span = np.ptp(np.append(readings.measured[in_channel], 0.0))
+        if rms > max(mean_error, constants.NEGLIGIBLE_FRACTION * span):
+            return True
+    return False

@@ -1,1 +1,0 @@
-"""Experiments for a gap analysis: discriminating runs and the identifiability audit."""

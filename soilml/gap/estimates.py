@@ -1,0 +1,236 @@
+"""Entries of a report that come from the posterior: soil, effects, candidates, the fitted case."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from soilml.config.case import Case
+from soilml.config.explanations import CaseExplanation
+from soilml.config.measurement_noise import Discrepancy, unestimated_bias
+from soilml.config.remainder import Remainder
+from soilml.fitting.coordinates import rates_at
+from soilml.fitting.effect_signatures import effect_signatures
+from soilml.fitting.fitted_readings import FittedReadings
+from soilml.fitting.least_squares import Solution
+from soilml.gap.decision import Decision
+from soilml.gap.remainder import discrepancy_amplitudes, learned_remainder
+from soilml.gap.results import CandidateSummary, NamedEffect
+from soilml.gap.scores import SignatureSimilarity
+from soilml.inference import constants
+from soilml.inference.constants import INTERVAL_FACTOR, SCATTER_UNITS
+from soilml.inference.explanation import Explanation
+from soilml.inference.posterior import Posterior
+from soilml.numerics.prior import Prior
+from soilml.quantities import column
+from soilml.remarks import Remark
+from soilml.report.numbers import round_significant
+from soilml.results import EstimatedValue
+
+PRIOR_HALF_WIDTH = 3.0  # Half width of the prior of an effect's size, in standard deviations
+#: Verdicts on candidates, where a cause is claimed and where none is, in words.
+_VERDICTS = {
+    "best": ("explains the data", "fits best, not claimed"),
+    "not-rejected": ("not rejected", "not rejected, not claimed"),
+    "rejected": ("rejected against the best",) * 2,
+}
+
+
+def stds_of(node: Explanation) -> dict[str, float]:
+    """Standard deviations of the parameters of a hypothesis, by path, beside its remainder."""
+    covariance = node.linear.evaluate(node.at).covariance
+    rates = np.abs(rates_at(node.fit.coordinates, node.fit.x))
+    std = INTERVAL_FACTOR * np.sqrt(np.diag(covariance)) * rates
+    return dict(zip((c.path for c in node.fit.coordinates), map(float, std), strict=True))
+
+
+def updated_case(
+    node: Explanation,
+    discrepancy: dict[str, float] | None = None,
+    remainder: Remainder | None = None,
+) -> Case:
+    """The fitted case: soil and effects at their optimum, with the priors and noise of the input.
+
+    Values are rounded to significant digits.
+
+    The size of each effect gets a uniform prior of three standard deviations to either side, so
+    that its uncertainty is propagated where the model is used. `discrepancy` has the standard
+    deviations of the smooth discrepancy by column, in the column's unit; None keeps what the case
+    declares. An error of a sensor that is fitted as an effect is no longer a bias. `remainder` is
+    what the fit leaves and was learned; None keeps that of the case.
+    """
+    fit, stds = node.fit, stds_of(node)
+    values = {path: round_significant(v) for path, v in fit.values().items()}
+    case = fit.case.with_values(values)
+    prior = dict(fit.case.prior)
+    bounds = {path: parameter for path, (parameter, _) in case.parameters().items()}
+    for c in fit.coordinates:
+        if not c.effect or c.is_shape:
+            continue
+        value, reach = values[c.path], PRIOR_HALF_WIDTH * stds[c.path]
+        lower = max(bounds[c.path].lower, round_significant(value - reach))
+        upper = min(bounds[c.path].upper, round_significant(value + reach))
+        if lower < upper:
+            prior[c.path] = Prior(lower, upper)
+    remaining = dict(fit.case.discrepancy)
+    if discrepancy is not None:
+        declared = next(iter(remaining.values()), Discrepancy())
+        remaining = {
+            name: replace(declared, share=0.0, constant=round_significant(std), learned=True)
+            for name, std in discrepancy.items()
+        }
+    return replace(
+        case,
+        prior=prior,
+        noise=dict(fit.case.noise),
+        discrepancy=remaining,
+        bias=unestimated_bias(fit.case.bias, set(fit.effects)),
+        remainder=case.remainder if remainder is None else remainder,
+    )
+
+
+def whole_answer(posterior: Posterior, decision: Decision) -> Explanation | None:
+    """The only explanation of the returned model; None where it is a mixture of several.
+
+    Effects are the whole answer where they are claimed, the soil alone where that is as likely.
+    """
+    if decision.claimed and decision.status != "class":
+        return decision.shown
+    if posterior.no_effect > constants.NAMED_PROBABILITY:
+        return next(node for node in posterior.nodes if not node.hypothesis.effects)
+    return None
+
+
+def weighed_explanations(posterior: Posterior) -> list[tuple[float, Explanation]]:
+    """The likeliest explanations that together hold `constants.HELD`, with their probabilities."""
+    found: list[tuple[float, Explanation]] = []
+    for node in posterior.nodes[: constants.MOST_RETURNED]:
+        found.append((posterior.node_weight(node), node))
+        if sum(weight for weight, _ in found) >= constants.HELD:
+            break
+    return found
+
+
+def returned_case(posterior: Posterior, whole: Explanation | None, seed: int) -> Case:
+    """What predicts: the case of the whole answer, else the mixture of all that is likely.
+
+    Of a mixture, the case itself has the mean soil and no effect; each explanation has its own.
+    The smooth remainder is that of the mixture.
+    """
+    parts = [(1.0, whole)] if whole is not None else weighed_explanations(posterior)
+    left, learned = discrepancy_amplitudes(posterior, parts), learned_remainder(posterior, parts)
+    if whole is not None:
+        return updated_case(whole, left, learned)
+    alone = updated_case(posterior.soil, left, learned)
+    mean = {p: round_significant(m.mean) for p, m in posterior.soil_marginals(seed).items()}
+    each = tuple(CaseExplanation.of(round(w, 4), updated_case(node)) for w, node in parts)
+    prior = dict(posterior.problem.case.prior)
+    return replace(alone, prior=prior, explanations=each).with_values(mean)
+
+
+def soil_before(fit: Solution) -> dict[str, EstimatedValue]:
+    """The soil parameters of a fit of the soil alone, by name."""
+    values, stds = fit.values(), fit.stds()
+    return {c.name: EstimatedValue(values[c.path], stds[c.path], c.unit) for c in fit.coordinates}
+
+
+def soil_after(posterior: Posterior, seed: int) -> dict[str, EstimatedValue]:
+    """The soil by all explanations together, by name: marginals of the posterior."""
+    found = posterior.soil_marginals(seed, INTERVAL_FACTOR)
+    return {
+        path.rpartition(".")[2]: EstimatedValue(own.mean, own.std, own.unit)
+        for path, own in found.items()
+    }
+
+
+def candidate_summaries(posterior: Posterior, decision: Decision) -> list[CandidateSummary]:
+    """The fitted sets of effects, the likeliest first, each with its likeliest law and soil."""
+    values = {n.hypothesis.effects: n.value for n in posterior.nodes[::-1]}
+    alone = values.pop((), np.inf)
+    lowest = min(values.values(), default=0.0)
+    summaries = []
+    for names, value in sorted(values.items(), key=lambda item: item[1]):
+        code = "not-rejected" if value < lowest + constants.NEAR else "rejected"
+        if names in decision.listed[:1]:
+            code = "best"
+        verdict = Remark(code, _VERDICTS[code][0 if decision.claimed else 1], names, "note")
+        summaries.append(CandidateSummary(names, alone - value, value - lowest, verdict))
+    return summaries
+
+
+def variance_component_entries(posterior: Posterior) -> dict[str, float]:
+    """Noise scales, scatter and autocorrelation of the likeliest hypothesis, by their names."""
+    terms, at = posterior.terms, posterior.noise
+    scales = {
+        f"noise_scale_{column(name)}": float(scale)
+        for name, scale in zip(terms.readings.channels, terms.noise_scale(at), strict=True)
+    }
+    angle, bearing = terms.scatter(at)
+    return scales | {
+        "friction_angle_std": float(angle * SCATTER_UNITS["friction_angle"]),
+        "bearing_std": float(bearing * SCATTER_UNITS["bearing"]),
+        "autocorrelation": at.autocorrelation,
+    }
+
+
+def readings_and_predictions(
+    posterior: Posterior, before: Solution, after: Solution
+) -> FittedReadings:
+    """Readings, predictions by the soil alone and by the fit shown, and standard deviations."""
+    readings, jacobian = posterior.terms.readings, after.derivatives
+    variance = np.einsum("ij,jk,ik->i", jacobian, after.covariance, jacobian)
+    return FittedReadings(
+        channels=tuple(column(n) for n in readings.channels),
+        channel=readings.channel,
+        run=tuple(readings.runs[readings.run[r]] for r in readings.row),
+        slip=readings.slip,
+        load=readings.load,
+        measured=readings.measured,
+        std=posterior.std,
+        before=before.prediction,
+        after=after.prediction,
+        after_std=np.sqrt(np.maximum(variance, 0.0)),
+    )
+
+
+def signature_similarity(posterior: Posterior, node: Explanation) -> SignatureSimilarity:
+    """Similarity of the catalogue's signatures beside the discrepancy of a node, on its soil."""
+    problem, readings = posterior.problem, posterior.terms.readings
+    whiten = posterior.terms.whiten(node.at, node.outliers)
+    soil = [i for i, c in enumerate(node.fit.coordinates) if not c.effect]
+    values = node.fit.values()
+    paths = [node.fit.coordinates[i].path for i in soil]
+    case = problem.case.with_values({path: values[path] for path in paths})
+    signatures, _ = effect_signatures(case, readings, problem.effects)
+    columns = {s.name: np.asarray(whiten @ s.column) for s in signatures}
+    space = np.asarray(whiten @ node.fit.derivatives[:, soil])
+    return SignatureSimilarity.beside(space, columns)
+
+
+def named_effects(
+    posterior: Posterior, decision: Decision, similarity: SignatureSimilarity
+) -> list[NamedEffect]:
+    """The effects of the first claimed set, with those of the other ones."""
+    node, best = decision.shown, decision.claimed[0]
+    assert node is not None
+    alternatives = {n for names in decision.claimed[1:] for n in names} - set(best)
+    values, stds, effects = node.fit.values(), stds_of(node), []
+    for name in best:
+        own = [(c, float(x)) for c, x in zip(node.fit.coordinates, node.fit.x, strict=True)]
+        own = [(c, x) for c, x in own if c.effect == name]  # the size precedes the shape of its law
+        snr, rival = similarity.separation(name, own[0][1] if own else 0.0)
+        effects.append(
+            NamedEffect(
+                name=name,
+                parameters={
+                    c.name: EstimatedValue(values[c.path], stds[c.path], c.unit) for c, _ in own
+                },
+                alternatives=tuple(sorted(alternatives)),
+                separating_snr=snr,
+                nearest_rival=rival,
+                probability=posterior.probability(name),
+                log_odds=posterior.log_odds(name),
+            )
+        )
+    return effects

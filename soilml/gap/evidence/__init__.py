@@ -1,1 +1,0 @@
-"""Statistics of a gap analysis: covariance, discrepancy and evidence, score tests, signatures."""

@@ -1,0 +1,330 @@
+"""What a gap analysis says, as one report, and the files that are written of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from soilml.gap.checks import MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS
+from soilml.gap.pictures import bars_picture, map_picture, remainder_picture
+from soilml.gap.results import STATUSES, GapReport
+from soilml.gap.sentences import needed_sizes
+from soilml.io.text_tables import csv_text
+from soilml.remarks import texts
+from soilml.report.numbers import channel_name
+from soilml.report.page import Provenance, json_text, page, report_entry
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
+
+#: What the reader should do, by status.
+_ADVICE = {
+    "no-gap": "Use the model as it is, within the measured range of slip and load.",
+    "undecided": "Find out why the measurements disagree: correct the noise in the model file or "
+    "the runs, and analyse again.",
+    "suspected": "Make the first run under Next runs. model.toml mixes the explanations that hold "
+    "95 % together, each with its weight.",
+    "partly-named": "model.toml contains the effect and, under [discrepancy], the size of what is "
+    "left, which widens every interval computed from it. Make the first run under Next runs.",
+    "named": "model.toml contains the effect. Make the first run under Next runs to confirm it.",
+    "class": "Make the first run under Next runs: it discriminates best between the explanations.",
+    "form-open": "model.toml contains the effect with a law fitted to these data. Use it within "
+    "the measured range of slip and load.",
+    "unknown": "See where the model disagrees, then check the sensors and the rig, or define an "
+    "effect of your own.",
+    "not-testable": "Add the runs that the verdict asks for, and analyse again.",
+    "bad-data": "Correct the runs or the model file as listed below, and analyse again.",
+}
+#: Statuses whose advice is to make the first of the next runs.
+_ADVISES_NEXT_RUN = ("suspected", "partly-named", "named", "class")
+#: Statuses under which suspects are listed: a named cause is not one of several suspects.
+_WITH_SUSPECTS = ("suspected", "unknown", "class", "not-testable")
+_TONES = {"no-gap": "good", "named": "plain", "partly-named": "plain", "bad-data": "bad"}
+_LISTED, _CANDIDATES = 6, 12  # Suspects and candidates that are listed
+_MOST_SIGMA = 10.0  # Discrimination beyond which only this bound is stated
+#: Names of the parts of the rows, by those of the figures in gap.json.
+PARTS = {
+    "train": "fitted rows",
+    "held_out_runs": "held-out runs",
+    "held_out_region": "held-out region",
+    "held_out_slips": "held-out slips",
+}
+_NEEDED = (
+    "At least one of torque, drawbar pull and sinkage, with readings that vary.",
+    "The noise of each: [noise] in the model file, a column such as torque_Nm_std, or repeats.",
+    f"At least {MIN_RESIDUAL_READINGS} readings more than free soil parameters, copies apart.",
+    f"To name a cause: at least {NAMING_RESIDUAL_READINGS} readings more, two runs, two loads and "
+    "three slips.",
+)
+_COMPONENTS = {
+    "friction_angle_std": ("friction angle from run to run, std", "rad"),
+    "bearing_std": ("bearing strength from run to run, std", "share"),
+    "autocorrelation": ("correlation of neighbouring samples", "1"),
+}
+_NOTATION = (
+    (
+        "gap",
+        "mean of ((measured - predicted) / sigma)^2, where sigma is the standard deviation of the "
+        "reading from sensor noise and run-to-run variation; noise alone gives 1.",
+    ),
+    ("held out", "the model is refitted without the runs, or the region, that it then predicts."),
+    ("sigma, +-", "one standard deviation."),
+)
+
+
+def gap_report(found: GapReport, title: str = "Gap between model and measurements") -> Report:
+    """The report of a gap analysis: verdict, readings beside the model, where, how large, what."""
+    untested = [f"{name}: {why.text}" for name, why in found.untestable.items()]
+    details: list[tuple[str, Sequence[str]]] = [
+        ("What an analysis needs", _NEEDED if found.status == "bad-data" else ()),
+        ("Why no cause is certain", texts(found.reasons)),
+        ("Conclusions that this report does not support", texts(found.not_claimed)),
+        ("Effects that these runs cannot test", untested),
+    ]
+    step = _ADVICE.get(found.status, "")
+    if found.status in _ADVISES_NEXT_RUN and not found.next_runs:
+        step = "Make runs at other slips and loads, and analyse all runs together."
+    return Report(
+        kind="gap",
+        verdict=found.sentence,
+        lines=texts(found.lines),
+        figures=_parameters(found),
+        tables=[*_tables(found)],
+        pictures=[*_pictures(found)],
+        remarks=found.notes,
+        next_steps=[step] if step else [],
+        details=[entry for entry in details if entry[1]],
+        status=found.status,
+        tone=_TONES.get(found.status, "warn"),
+        title=title,
+        basis=f"{STATUSES.get(found.status, '')}; seed {found.seed}",
+        notation=_NOTATION if found.gap else (),
+    )
+
+
+def shown_model(found: GapReport) -> str:
+    """The model whose figures are shown beside those of the soil alone, in words."""
+    names = " + ".join(e.name for e in found.effects)
+    if found.status == "class":
+        return f"with {names}, the likeliest of {len(found.cause_set)} explanations"
+    if names:
+        return f"with {names}"
+    return f"with {' + '.join(found.best_unclaimed) or 'the best candidate'}, which is not claimed"
+
+
+def _parameters(found: GapReport) -> ReportTable | None:
+    """Soil and added effects, with the soil alone beside them where that differs."""
+    columns = found.frame_columns()
+    if not columns["parameter"]:
+        return None
+    if found.soil_before == found.soil_after:
+        return ReportTable.of_parameters("Soil and effects", columns)
+    alone = Column(
+        "soil alone",
+        columns["mean_before"],
+        columns["unit"],
+        columns["std_before"],
+        sizes=columns["mean"],
+    )
+    note = f"The soil {shown_model(found)}; 'soil alone' is biased where an effect is missing."
+    if not found.effects and not found.best_unclaimed:
+        note = "The soil beside a smooth discrepancy of unknown cause, and alone."
+    return ReportTable.of_parameters("Soil and effects", columns, note, **{"soil alone": alone})
+
+
+def _tables(found: GapReport) -> Iterator[ReportTable]:
+    if found.status in _WITH_SUSPECTS and found.suspects:
+        yield _suspects(found)
+    if found.gap:
+        yield _sizes(found)
+    if found.effects:
+        yield ReportTable(
+            "Added effects",
+            [
+                Column("effect", [e.name for e in found.effects]),
+                Column("probability", [e.probability for e in found.effects], digits=3),
+                Column("sigma apart", [e.separating_snr for e in found.effects], digits=3),
+                Column("most similar", [e.nearest_rival for e in found.effects]),
+                Column("alternatives", [", ".join(e.alternatives) for e in found.effects]),
+            ],
+            "Sigma that distinguish the effect from the soil and from the most similar effect; "
+            f"probability of a gap {found.gap_probability:.2f}.",
+        )
+    if any(d.after_sigma > 0.0 for d in found.discrepancy.values()):
+        yield _discrepancy(found)
+    if found.next_runs:
+        yield _next_runs(found)
+    if found.soil_tests:
+        tests, units = found.soil_tests, [test.unit for test in found.soil_tests]
+        yield ReportTable(
+            "Tests of the soil",
+            [
+                Column("test", [t.label for t in tests]),
+                Column("measured", [t.measured for t in tests], units, digits=3),
+                Column("soil alone, sigma off", [t.sigma_before for t in tests], digits=2),
+                Column("soil after, sigma off", [t.sigma_after for t in tests], digits=2),
+            ],
+            "Distances in standard deviations of what such tests scatter from place to place.",
+        )
+    if found.candidates:
+        shown = found.candidates[:_CANDIDATES]
+        yield ReportTable(
+            "Candidates",
+            [
+                Column("effects", [" + ".join(c.effects) for c in shown]),
+                Column("gain", [c.achieved_gain for c in shown]),
+                Column("excess over the best", [c.excess for c in shown], digits=3),
+                Column("verdict", [c.verdict.text for c in shown]),
+            ],
+            "Gain: decrease of -2 ln of the posterior probability.",
+        )
+    if found.variance_components:
+        yield _components(found)
+
+
+def _suspects(found: GapReport) -> ReportTable:
+    shown = found.suspects[:_LISTED]
+    given = ", and if ".join(texts(found.conditions))
+    columns = [
+        Column("effects", [" + ".join(s.effects) for s in shown]),
+        Column("probability", [s.probability for s in shown], digits=2),
+        Column("ln(odds)", [s.log_odds for s in shown], digits=3),
+        Column(
+            "ln(density kept back)",
+            [np.nan if s.predictive_gain is None else s.predictive_gain for s in shown],
+            digits=3,
+        ),
+    ]
+    if any(s.times_usual for s in shown):
+        columns.append(Column("needs", [needed_sizes(s) for s in shown]))
+    note = f"Probabilities are valid if {given}." if given else ""
+    return ReportTable("Suspects", columns, note)
+
+
+def _sizes(found: GapReport) -> ReportTable:
+    """Mean squared residuals by part of the rows and channel, before and after."""
+    rows = [
+        (
+            PARTS.get(key, key.replace("_", " ")),
+            name,
+            before,
+            after if part.shrinks else np.nan,
+            part,
+        )
+        for key, part in found.gap.items()
+        for name, (before, after) in (
+            ("all readings", (part.before, part.after)),
+            *((channel_name(n), pair) for n, pair in part.channels.items()),
+        )
+    ]
+    where, channel, before, after, parts = map(list, zip(*rows, strict=True))
+    columns = [
+        Column("rows", where),
+        Column("channel", channel),
+        Column("soil alone", before, digits=3),
+    ]
+    if not np.isnan(after).all():
+        columns.append(Column("after", after, digits=3))
+    columns.append(Column("readings", [part.readings for part in parts]))
+    columns.append(Column("what", [part.description for part in parts]))
+    note = "Mean squared residual in sigma; noise alone gives 1. Blank: not smaller after."
+    return ReportTable("Size of the gap", columns, note)
+
+
+def _discrepancy(found: GapReport) -> ReportTable:
+    left = found.discrepancy
+    cause = ""
+    if found.remainder_cause is not None:
+        chance = found.remainder_cause.probability
+        cause = f" {found.remainder_cause.remark().text} Probability of this stage: {chance:.2f}."
+    return ReportTable(
+        "Remaining disagreement",
+        [
+            Column("channel", [channel_name(name) for name in left]),
+            Column("root mean square", [d.after_value for d in left.values()],
+                   [d.unit for d in left.values()], digits=3),
+            Column("sigma", [d.after_sigma for d in left.values()], digits=2),
+            Column("where it is largest", [d.description for d in left.values()]),
+        ],
+        f"Smooth discrepancy that is left, with a probability of {found.remainder_probability:.2f}."
+        f"{cause}",
+    )  # fmt: skip
+
+
+def _next_runs(found: GapReport) -> ReportTable:
+    runs = found.next_runs
+    sigma = [min(run.discrimination, _MOST_SIGMA) for run in runs]
+    columns = [Column("kind", [run.kind for run in runs]), Column("sigma", sigma, digits=3)]
+    if runs[0].cost is not None:
+        columns.append(Column("cost", [run.cost for run in runs], digits=3))
+    columns.append(Column("what to do", [run.text for run in runs]))
+    first, *others = [" + ".join(names) or "the soil alone" for names in runs[0].compared or [()]]
+    apart = f" of {first} from {', '.join(others)}" if others else ""
+    note = f"Expected discrimination{apart}, at most 10 stated; above 3 sigma a run decides."
+    return ReportTable("Next runs", columns, note)
+
+
+def _components(found: GapReport) -> ReportTable:
+    names, values, units = [], [], []
+    for key, value in found.variance_components.items():
+        scale = key.removeprefix("noise_scale_")
+        name, unit = _COMPONENTS.get(key, (key, "1"))
+        names.append(name if scale == key else f"noise of {channel_name(scale)} over the declared")
+        values.append(value)
+        units.append(unit)
+    columns = [Column("quantity", names), Column("size", values, units, digits=2)]
+    return ReportTable(
+        "Estimated variation", columns, "It is part of the noise throughout this report."
+    )
+
+
+def _pictures(found: GapReport) -> Iterator[Picture]:
+    if found.curves is not None:
+        yield found.curves.picture(shown_model(found))
+    if found.where:
+        yield map_picture(found)
+    if found.gap:
+        yield bars_picture(found, PARTS)
+    if found.model.remainder is not None:
+        yield remainder_picture(found.model.remainder)
+
+
+def gap_files(
+    found: GapReport, model_name: str, runs_name: str, origin: Provenance | None = None
+) -> dict[str, str]:
+    """The content of a report's files by their names.
+
+    model_name, runs_name: Names of the analysed files.
+    """
+    from soilml.config.write_case import case_as_toml
+
+    if origin is None:
+        origin = Provenance.of(["gap", model_name, runs_name], [])
+    report = gap_report(found, f"Gap report: {model_name} against {runs_name}")
+    comments = [found.sentence]
+    if count := len(found.model.explanations):
+        which = "One explanation follows" if count == 1 else f"{count} explanations follow"
+        comments += [f"{which}, with weights; every prediction mixes them."]
+    return {
+        "report.html": page(report, origin),
+        "gap.json": json_text(found.as_json() | {"report": report_entry(report, origin)}),
+        "model.toml": case_as_toml(found.model, comments),
+        "next_runs.csv": csv_text(_planned_runs(found)),
+    }
+
+
+def _planned_runs(found: GapReport) -> dict[str, list[Any]]:
+    """The suggested runs, one line for each operating point; a sensor check has one line."""
+    lines: list[dict[str, Any]] = []
+    for number, option in enumerate(found.next_runs, 1):
+        head: dict[str, Any] = {"run": f"next_{number}", "kind": option.kind, "what": option.text}
+        head["separates_sigma"] = option.discrimination
+        if option.cost is not None:
+            head["cost"] = option.cost
+        lines += [head | row for row in option.rows or [{}]]
+    names = ["run", "kind", "what", "separates_sigma"]
+    names += ["cost"] if any("cost" in line for line in lines) else []
+    names += ["slip", "load_N"]
+    names += [name for line in lines for name in line if name not in names]
+    return {name: [line.get(name, "") for line in lines] for name in dict.fromkeys(names)}

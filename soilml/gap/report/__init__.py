@@ -1,1 +1,0 @@
-"""The report of a gap analysis: its result, its sentences and its page."""

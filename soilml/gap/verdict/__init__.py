@@ -1,1 +1,0 @@
-"""The verdict of a gap analysis: status, claimed effects, figures, and what is left."""
