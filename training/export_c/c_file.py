@@ -48,6 +48,20 @@ SCALARS = ("in_range", "misfit")
 SINGLE_OUTPUTS = ("mean", "std", "covariance", "in_range")  # Of a file that estimates from rows
 
 
+#: What functions return: zero or more with an answer, below zero where nothing was changed.
+CODES = (
+    ("OK", 0, "answered"),
+    ("OUT_OF_RANGE", 1, "readings out of the range of training, or inconsistent with any soil"),
+    ("BAD_READING", -1, "a reading is not finite or impossible, or a single row lacks one"),
+    ("BAD_STD", -2, "a standard deviation is negative, zero or not finite"),
+    ("BAD_CONTEXT", -3, "a value for the whole set is out of range, or not begun as usual"),
+    ("BAD_COUNT", -4, "no row, or more rows than one step takes"),
+    ("NOT_STARTED", -5, "the memory was not started, is damaged, or of another model file"),
+    ("NO_ROWS", -6, "the memory has no row yet"),
+    ("NOT_FINITE", -7, "numbers beyond those of float: a standard deviation is absurd"),
+)
+
+
 @dataclass(frozen=True)
 class CFile:
     """Texts of the C file and of its header, and the memory that they need."""
@@ -121,6 +135,7 @@ def write_c(
         "identity": {key: metadata[key] for key in IDENTITY if key in metadata},
         "noise": fields["sets"].noise if fields["sets"] else {},
         "sha": metadata["graph_sha256"],
+        "codes": CODES,
         "interface": interface,
         "functions": functions,
         "single": single,
