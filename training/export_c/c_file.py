@@ -94,7 +94,7 @@ def write_c(
 
     Raises `ModelFileError` for a graph with an operator, a type or a shape that is not known.
     """
-    model = with_templates(in_single_precision(model, metadata))
+    model = with_templates(in_single_precision(model, metadata)[0])
     interface, shared = read_interface(model, metadata), SharedParts()
     single = single_function(model, shared) if interface.single else None
     sets = set_functions(model, interface, shared, rows) if interface.sets else None
@@ -209,13 +209,11 @@ def _exact_columns(interface: Interface) -> int:
 
 
 def kernel_texts(shared: SharedParts) -> list[str]:
-    """Texts of the kernels of a file."""
-    return [kernel_text(*parts) for parts in sorted(shared.kernels)]
-
-
-def kernel_text(name: str, kind: str) -> str:
-    """The text of a kernel for one element type."""
-    text = (KERNELS / f"{name}.c").read_text()
-    for mark, functions in _MATH.items():
-        text = text.replace(mark, functions.get(kind, mark))
-    return text.replace("REAL", kind)
+    """Texts of the kernels of a file, each for one element type."""
+    found = []
+    for name, kind in sorted(shared.kernels):
+        text = (KERNELS / f"{name}.c").read_text()
+        for mark, functions in _MATH.items():
+            text = text.replace(mark, functions.get(kind, mark))
+        found.append(text.replace("REAL", kind))
+    return found
