@@ -54,7 +54,7 @@ CODES = (
     ("OUT_OF_RANGE", 1, "readings out of the range of training, or inconsistent with any soil"),
     ("BAD_READING", -1, "a reading is not finite or impossible, or a single row lacks one"),
     ("BAD_STD", -2, "a standard deviation is negative, zero or not finite"),
-    ("BAD_CONTEXT", -3, "a value for the whole set is out of range, or not begun as usual"),
+    ("BAD_CONTEXT", -3, "a value for a set is out of range, or not begun by usual_context"),
     ("BAD_COUNT", -4, "no row, or more rows than one step takes"),
     ("NOT_STARTED", -5, "the memory was not started, is damaged, or of another model file"),
     ("NO_ROWS", -6, "the memory has no row yet"),
