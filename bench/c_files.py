@@ -25,7 +25,7 @@ from simulated_rows import ANY_WHEEL, rows_of
 from soilml import Estimator
 from soilml.cli import main
 from soilml.onboard.set_contract import MEMORY_OUTPUTS, SET_OUTPUTS, SET_PREFIX
-from training.export_c.single_precision import change_by_single_precision
+from training.export_c.single_precision import in_single_precision
 
 FILES = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel", "kls1_wheel")
 COMPARED, SMALL = ("wheel", "any_wheel"), ("wheel_small", "any_wheel_small")
@@ -197,7 +197,7 @@ def memory(case: Row) -> Row:
         model = onnx.load(ROOT / "exported" / f"{name}.onnx")
         metadata = {entry.key: entry.value for entry in model.metadata_props}
         header = generated(name).with_suffix(".h").read_text()
-        found["float"] = f"{change_by_single_precision(model, metadata):.0e}"
+        found["float"] = f"{in_single_precision(model, metadata)[1]:.0e}"
         found["computed"] = "double" if "double doubles[" in header else "float"
     return found
 

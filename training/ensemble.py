@@ -9,7 +9,6 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.onboard.fusion_rules import best_linear, shrink_correlation
 from training.calibration.recalibration import CalibratedRegressor
-from training.onnx_graph.builder import Graph
 from training.onnx_graph.value import Value, concat, sqrt
 
 #: Rows of which correlations are shrunk entirely; by a share of this number over theirs beyond.
@@ -39,18 +38,17 @@ class Ensemble:
         variance = np.einsum("inq,qij,jnq->nq", weighted, self.correlation, weighted)
         return (self.weights[:, None, :] * mean).sum(axis=0), np.sqrt(variance)
 
-    def add_to_graph(self, graph: Graph, features: str) -> tuple[str, str]:
-        r"""Add all members and their combination to an ONNX graph; names of mean and std, (n, q).
+    def add_to_graph(self, features: Value) -> tuple[Value, Value]:
+        r"""Add all members and their combination to an ONNX graph; mean and std, (n, q).
 
         .. math:: \mu = \sum_i w_i \mu_i, \qquad
             \sigma^2 = \sum_i \sum_j w_i w_j \sigma_i \sigma_j \rho_{ij}
         """
         means, stds = [], []
         for member in self.members:
-            mean, std = member.regressor.add_to_graph(graph, features)
-            scaled = graph.op("Mul", std, graph.constant(member.std_scale))
-            means.append(Value(graph, mean, np.float64))
-            stds.append(Value(graph, scaled, np.float64))
+            mean, std = member.regressor.add_to_graph(features)
+            means.append(mean)
+            stds.append(std * member.std_scale)
         m, q = self.weights.shape
         # one product sums estimates, and one the products of all pairs of their standard deviations
         quantity, columns = np.arange(q), np.arange(m * q).reshape(m, q)
@@ -67,7 +65,7 @@ class Ensemble:
         )
         variance = (left * right) @ of_pairs.reshape(-1, q)
         of_estimates = (self.weights[:, :, None] * np.eye(q)).reshape(-1, q)
-        return (concat(means, axis=1) @ of_estimates).name, sqrt(variance).name
+        return concat(means, axis=1) @ of_estimates, sqrt(variance)
 
 
 def fuse_members(

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -102,37 +102,6 @@ def test_probabilities_are_judged_by_all_their_bins_and_by_what_chance_does():
     name = "stated probabilities, share of exact ones"
     assert figure(list(sets(exact)), name).met and not figure(list(sets(low)), name).met
     assert np.isnan(gap_reliability.calibration_error([record()])[0])
-
-
-def test_a_group_is_enlarged_until_it_has_enough_sets():
-    plan = Plan("A", "slip-sinkage", 1.0, 0.02, 8, "dry-sand", 3, 0, discrepancy=0.04)
-    plans = [replace(plan, seed=i) for i in range(40)]
-    plans += [replace(plan, seed=50, discrepancy=0.02), replace(plan, seed=51, tier="D", cause="")]
-    sample = plans[:4]
-
-    def snr(given):
-        return 4.0 if given.seed % 2 else 1.0
-
-    found = list(gap_bench.added(plans, sample, 10, snr))
-    assert {group for _, group in found} == {gap_figures.LARGE} and len(found) == 8
-    assert all(snr(p) > 3.0 and p not in sample and p.discrepancy == 0.04 for p, _ in found)
-    assert len(list(gap_bench.added(plans, sample, 99, snr))) == 18  # as far as there are any
-
-
-def test_region_soil_and_time_are_compared_with_their_gates():
-    sets = [record(), record(status="partly-named"), record(region={"soil": 1.0, "named": 9.0})]
-    assert figure(sets, "held-out region").measured == "0.200"
-    assert figure(sets, "the same over that of a Gaussian process").measured == "0.400"
-    assert figure(sets, "the same over that of a Gaussian process").met
-    off = {"cohesion": {"before": 500.0, "after": 830.0, "std": 10.0, "true": 800.0}}
-    sets = [record(discrepancy=0.02) for _ in range(9)] + [record(discrepancy=0.02, soil=off)]
-    held = figure(sets, "90 % interval of c: coverage, discrepancy 2%")
-    assert held.met and held.measured.endswith("9/10")
-    slow = [record(seconds=0.8), record(seconds=0.9), record(seconds=12.0)]
-    name = "seconds of a core of 500,000 solutions a second, 49 to 72 rows"
-    assert not figure(slow, name).met and figure(slow[:2], name).met
-    doubled = [record(seconds=1.8, solves=250_000.0)]
-    assert figure(doubled, name).measured.startswith("0.90")
 
 
 @pytest.mark.slow

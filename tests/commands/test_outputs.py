@@ -124,8 +124,7 @@ def test_files_that_read_the_same_are_not_fused_as_if_they_erred_independently(t
     log = tmp_path / "log.csv"
     log.write_text("run,slip,load_N,torque_Nm\na,0.2,60,2.1\n")
     command = ["estimate", str(exported / "wheel.onnx"), str(log)]
-    twin = [*command, "--with", str(exported / "wheel.onnx")]
-    assert main(twin) == 2
+    assert main([*command, "--with", str(exported / "wheel.onnx")]) == 2
     assert "their errors are not independent" in capsys.readouterr().err
 
 

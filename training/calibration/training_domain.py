@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from training.onnx_graph.builder import Graph
+from training.onnx_graph.value import Value, absolute, maximum, squared_distances
 from training.regressors.gaussian_regressor import Standardisation
 
 #: Readings that are operating conditions: the driver sets them, the soil does not.
@@ -80,21 +80,16 @@ class ConditionalBounds:
         values = features[:, self.column]
         return np.asarray((values >= lower) & (values <= upper))
 
-    def add_outside(self, graph: Graph, features: str) -> str:
-        """Add to an ONNX graph whether rows lie outside the bounds; name of the value (n,)."""
+    def add_outside(self, features: Value) -> Value:
+        """Add to an ONNX graph whether rows (n, d) lie outside the bounds, (n,)."""
         weights = []
         for k, along in zip(self.conditions, self.knots, strict=True):
-            ends = [graph.constant(end) for end in (along[0], along[-1])]
-            clipped = graph.op("Clip", graph.columns(features, k, k + 1), *ends)
-            distance = graph.scaled(clipped, along, along[1] - along[0])
-            hat = graph.op("Sub", graph.constant(1.0), graph.op("Abs", distance))
-            weights.append(graph.op("Max", hat, graph.constant(0.0)))
-        value = graph.reshaped(graph.columns(features, self.column, self.column + 1), -1)
-        outside = [
-            graph.op(comparison, value, _add_interpolation(graph, weights, bound))
-            for comparison, bound in (("Less", self.lower), ("Greater", self.upper))
-        ]
-        return graph.op("Or", *outside)
+            clipped = features.columns(k, k + 1).clip(along[0], along[-1])
+            distance = (clipped - along) / float(along[1] - along[0])
+            weights.append(maximum(1.0 - absolute(distance), 0.0))
+        value = features.columns(self.column, self.column + 1).reshape(-1)
+        lower, upper = (_add_interpolation(weights, bound) for bound in (self.lower, self.upper))
+        return (value < lower) | (value > upper)
 
 
 def _hat_functions(values: Floats, knots: Floats) -> Floats:
@@ -112,12 +107,12 @@ def _interpolate(weights: list[Floats], bound: Floats) -> Floats:
     return np.asarray((along_first * weights[1]).sum(axis=1))
 
 
-def _add_interpolation(graph: Graph, weights: list[str], bound: Floats) -> str:
+def _add_interpolation(weights: list[Value], bound: Floats) -> Value:
     """The same as nodes of an ONNX graph."""
-    along_first = graph.op("MatMul", weights[0], graph.constant(bound))
+    along_first = weights[0] @ bound
     if len(weights) == 1:
         return along_first
-    return graph.reduced("ReduceSum", graph.op("Mul", along_first, weights[1]), 1)
+    return (along_first * weights[1]).sum(axis=1, keepdims=False)
 
 
 #: Number of balls, and of the rows that their centres are selected from: more cost time and bytes.
@@ -196,21 +191,15 @@ class TrainingDomain:
         within = [bounds.contains(features) for bounds in self.bounds]
         return np.asarray(np.logical_and.reduce([in_box, covered, *within]))
 
-    def add_to_graph(self, graph: Graph, features: str) -> str:
-        """Add the same test to an ONNX graph; name of the flag (n,)."""
-        outside = graph.op(
-            "Or",
-            graph.op("Less", features, graph.constant(self.lower)),
-            graph.op("Greater", features, graph.constant(self.upper)),
-        )
-        any_outside = graph.reduced("ReduceMax", graph.double(outside), 1)
-        x = graph.scaled(features, self.scaling.mean, self.scaling.scale)
-        nearest = graph.reduced("ReduceMin", graph.squared_distances(x, self.centres), 1)
-        far = graph.op("Greater", nearest, graph.constant(self.radius**2))
-        out = graph.op("Or", graph.op("Greater", any_outside, graph.constant(0.5)), far)
+    def add_to_graph(self, features: Value) -> Value:
+        """Add the same test of features (n, d) to an ONNX graph; the flag (n,)."""
+        outside = ((features < self.lower) | (features > self.upper)).astype(np.float64)
+        x = (features - self.scaling.mean) / self.scaling.scale
+        nearest = squared_distances(x, self.centres).reduce("ReduceMin", 1, False)
+        out = (outside.reduce("ReduceMax", 1, False) > 0.5) | (nearest > self.radius**2)
         for bounds in self.bounds:
-            out = graph.op("Or", out, bounds.add_outside(graph, features))
-        return graph.op("Not", out)
+            out = out | bounds.add_outside(features)
+        return ~out
 
 
 def _largest_gap(z: Floats) -> float:

@@ -22,9 +22,10 @@ its header OUT.h. They use the structs that export-c writes for each file.
 slip_fuse() weighs the estimates by their variances and by the correlation of
 their errors, which are in the files. docs/how-to/deploy.md describes it.
 """
+
+
 ARGUMENTS = (
-    ("first FIRST.onnx", "a file, named as its C file", InputFile),
-    ("second SECOND.onnx", "the other one", InputFile),
+    ("model MODEL.onnx", "two files, named as their C files", InputFile, {"nargs": 2}),
     ("out OUT.c", "C file to write; OUT.h is written beside it"),
 )
 
@@ -44,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.onboard.model_file import find_model
     from training.export_c.fusion import write_fusion
 
-    out, files = Path(args.out), [find_model(model) for model in (args.first, args.second)]
+    out, files = Path(args.out), [find_model(model) for model in args.model]
     for name in (out, *(file.with_suffix(".c") for file in files)):
         check_c_name(name)
     estimators = [Estimator.load(file) for file in files]

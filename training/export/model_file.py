@@ -25,6 +25,7 @@ from soilml.onboard.set_contract import INTERFACE
 from soilml.quantities import QUANTITIES, SHEAR, Z_90
 from training.dataset import PER_ROW
 from training.onnx_graph.builder import IR_VERSION, OPSET, Graph, Output, session_of
+from training.onnx_graph.value import Value, absolute, concat, maximum, minimum, where
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.posterior_summary import prior_summary
 from training.set_posterior.validation import (
@@ -77,49 +78,34 @@ def build_graph(trained: TrainedModel) -> Any:
 
 def _add_single_rows(trained: TrainedModel, graph: Graph, prefix: str) -> None:
     """Add the estimates of single rows to a graph; outputs are named `<prefix><output>`."""
-    spec, estimator = trained.spec, trained.estimator
-    names = list(inputs_of(spec.features))
-    double = {name: graph.double(name) for name in names}
-    total = graph.op("Sum", *double.values())  # (rows,), also where an input has one element
-    rows = graph.op("Shape", total)
-    double = {name: graph.op("Expand", value, rows) for name, value in double.items()}
+    spec, estimator, prior = trained.spec, trained.estimator, trained.prior
+    double = {name: Value(graph, name).astype(np.float64) for name in inputs_of(spec.features)}
+    first, *others = double.values()
+    total = first.node("Sum", *others)  # (rows,), also where an input has one element
+    rows = total.node("Shape")
+    double = {name: value.node("Expand", rows) for name, value in double.items()}
     columns = []
     for feature in spec.features:
         top, bottom = numerator_denominator(feature)
-        value = graph.op("Div", double[top], double[bottom]) if bottom else double[top]
-        columns.append(graph.reshaped(value, -1, 1))
-    features = graph.op("Concat", *columns, axis=1)
-    finite, features = _add_finite_rows(graph, total, features)
-    mean, std = estimator.regressor.add_to_graph(graph, features)
-    std = graph.op("Mul", std, graph.constant(estimator.std_scale))
-    q = len(spec.targets)
-    outer = graph.op("Mul", graph.reshaped(std, -1, q, 1), graph.reshaped(std, -1, 1, q))
-    covariance = graph.op("Mul", outer, graph.constant(estimator.correlation))
-    inside = graph.op("And", trained.domain.add_to_graph(graph, features), finite)
-    graph.op("Identity", inside, out=prefix + "in_range")
-    ends = [graph.constant(end) for end in (trained.prior.lower, trained.prior.upper)]
-    clipped = graph.op("Min", graph.op("Max", mean, ends[0]), ends[1])
-    prior = np.diag(trained.prior.std**2)
+        value = double[top] / double[bottom] if bottom else double[top]
+        columns.append(value.reshape(-1, 1))
+    features = concat(columns, axis=1)
+    # the features of rows with inputs or features that are not finite are replaced by zeros
+    finite = absolute(total + features.sum(axis=1, keepdims=False)) <= LARGEST_SUM
+    features = where(finite.reshape(-1, 1), features, 0.0)
+    mean, std = estimator.regressor.add_to_graph(features)
+    std, q = std * estimator.std_scale, len(spec.targets)
+    covariance = std.reshape(-1, q, 1) * std.reshape(-1, 1, q) * estimator.correlation
+    inside = trained.domain.add_to_graph(features) & finite
+    inside.node("Identity").named(prefix + "in_range")
+    clipped = minimum(maximum(mean, prior.lower), prior.upper)
     answers = {
-        "mean": (clipped, trained.prior.mean, (-1, 1)),
-        "std": (std, trained.prior.std, (-1, 1)),
-        "covariance": (covariance, prior, (-1, 1, 1)),
+        "mean": (clipped, prior.mean, (-1, 1)),
+        "std": (std, prior.std, (-1, 1)),
+        "covariance": (covariance, np.diag(prior.std**2), (-1, 1, 1)),
     }
     for name, (value, otherwise, shape) in answers.items():
-        flag = graph.reshaped(inside, *shape)
-        answer = graph.op("Where", flag, value, graph.constant(otherwise))
-        graph.single(answer, prefix + name)
-
-
-def _add_finite_rows(graph: Graph, total: str, features: str) -> tuple[str, str]:
-    """Which rows have finite inputs, of which `total` is the sum, and finite features.
-
-    The features of the others are replaced by zeros.
-    """
-    check = graph.op("Add", total, graph.reduced("ReduceSum", features, 1))
-    finite = graph.op("LessOrEqual", graph.op("Abs", check), graph.constant(LARGEST_SUM))
-    column = graph.reshaped(finite, -1, 1)
-    return finite, graph.op("Where", column, features, graph.constant(0.0))
+        where(inside.reshape(*shape), value, otherwise).astype(np.float32).named(prefix + name)
 
 
 def file_metadata(

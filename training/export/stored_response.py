@@ -92,15 +92,20 @@ def _stored_posterior(model: Any, metadata: Mapping[str, str], path: Path) -> Se
     """The set posterior of a file, with the response that it has."""
     sets = json.loads(metadata["set"])
     family = _family(metadata, sets, path)
-    branch = model.graph if sets["alone"] else _branch(model, "then_branch")
+    branch = model.graph
+    if not sets["alone"]:
+        branch = next(a.g for a in branch.node[0].attribute if a.name == "then_branch")
     limits = MisfitLimits(*(np.asarray(sets["misfit"][key]) for key in ("readings", "most")))
     terms = tuple(tuple(term) for term in sets.get("monomials", ())) or family_terms(family)
     response = read_response(branch, family, sets["error"], terms)
     response = replace(response, carried=float(sets.get("carried", 1.0)))
+    stated = json.loads(metadata["spec"]).get("set_posterior", {})
+    scales = USUAL_SCALES
+    if "model_errors" in stated:
+        scales = ErrorScales.of_list(stated["model_errors"])
+    errors = {name: float(std) for name, std in stated.get("sensor_errors", {}).items()}
     small = bool(sets.get("small", False))
-    return SetPosteriorGraph(
-        family, response, limits, sets["noise"], small, _scales(metadata), _sensor_errors(metadata)
-    )
+    return SetPosteriorGraph(family, response, limits, sets["noise"], small, scales, errors)
 
 
 def _with_tables(card: str, tables: Sequence[Sequence[str]]) -> str:
@@ -121,23 +126,6 @@ def _family(metadata: Mapping[str, str], sets: Mapping[str, Any], path: Path) ->
         return DimensionlessFamily.take(Settings(ranges, "[any_wheel]"))
     targets = [entry["name"] for entry in json.loads(metadata["outputs"])]
     return RecipeFamily.of(parse_recipe(metadata["recipe"], str(path)), targets)
-
-
-def _scales(metadata: Mapping[str, str]) -> ErrorScales:
-    """Scales of the model's errors that the spec of a file states, else the usual ones."""
-    stated = json.loads(metadata["spec"]).get("set_posterior", {}).get("model_errors")
-    return USUAL_SCALES if stated is None else ErrorScales.of_list(stated)
-
-
-def _sensor_errors(metadata: Mapping[str, str]) -> dict[str, float]:
-    """Errors of the sensors that the spec of a file states."""
-    stated = json.loads(metadata["spec"]).get("set_posterior", {}).get("sensor_errors", {})
-    return {name: float(std) for name, std in stated.items()}
-
-
-def _branch(model: Any, name: str) -> Any:
-    """A branch of the graph's only node."""
-    return next(a.g for a in model.graph.node[0].attribute if a.name == name)
 
 
 def _beside_single_rows(model: Any, sets: Graph, posterior: SetPosteriorGraph) -> Any:
@@ -164,17 +152,12 @@ def _beside_single_rows(model: Any, sets: Graph, posterior: SetPosteriorGraph) -
     for name, value in (defaults | {SET_SWITCH: np.zeros(1, bool)}).items():
         changed.graph.initializer.append(numpy_helper.from_array(np.asarray(value), name))
     for entry in changed.graph.input:
-        if entry.name in posterior.inputs:
-            _resize(entry, posterior.inputs[entry.name])
+        sizes = posterior.inputs.get(entry.name, [])
+        for dimension, size in zip(entry.type.tensor_type.shape.dim, sizes, strict=False):
+            if isinstance(size, int):
+                dimension.dim_value = size
     checker.check_model(changed, full_check=True)
     return changed
-
-
-def _resize(entry: Any, shape: list[Any]) -> None:
-    """Give an input the shape that it has now."""
-    for dimension, size in zip(entry.type.tensor_type.shape.dim, shape, strict=True):
-        if isinstance(size, int):
-            dimension.dim_value = size
 
 
 def read_response(

@@ -48,6 +48,20 @@ SCALARS = ("in_range", "misfit")
 SINGLE_OUTPUTS = ("mean", "std", "covariance", "in_range")  # Of a file that estimates from rows
 
 
+#: What functions return: zero or more with an answer, below zero where nothing was changed.
+CODES = (
+    ("OK", 0, "answered"),
+    ("OUT_OF_RANGE", 1, "readings out of the range of training, or inconsistent with any soil"),
+    ("BAD_READING", -1, "a reading is not finite or impossible, or a single row lacks one"),
+    ("BAD_STD", -2, "a standard deviation is negative, zero or not finite"),
+    ("BAD_CONTEXT", -3, "a value for a set is out of range, or not begun by usual_context"),
+    ("BAD_COUNT", -4, "no row, or more rows than one step takes"),
+    ("NOT_STARTED", -5, "the memory was not started, is damaged, or of another model file"),
+    ("NO_ROWS", -6, "the memory has no row yet"),
+    ("NOT_FINITE", -7, "numbers beyond those of float: a standard deviation is absurd"),
+)
+
+
 @dataclass(frozen=True)
 class CFile:
     """Texts of the C file and of its header, and the memory that they need."""
@@ -80,7 +94,7 @@ def write_c(
 
     Raises `ModelFileError` for a graph with an operator, a type or a shape that is not known.
     """
-    model = with_templates(in_single_precision(model, metadata))
+    model = with_templates(in_single_precision(model, metadata)[0])
     interface, shared = read_interface(model, metadata), SharedParts()
     single = single_function(model, shared) if interface.single else None
     sets = set_functions(model, interface, shared, rows) if interface.sets else None
@@ -121,6 +135,7 @@ def write_c(
         "identity": {key: metadata[key] for key in IDENTITY if key in metadata},
         "noise": fields["sets"].noise if fields["sets"] else {},
         "sha": metadata["graph_sha256"],
+        "codes": CODES,
         "interface": interface,
         "functions": functions,
         "single": single,
@@ -194,13 +209,11 @@ def _exact_columns(interface: Interface) -> int:
 
 
 def kernel_texts(shared: SharedParts) -> list[str]:
-    """Texts of the kernels of a file."""
-    return [kernel_text(*parts) for parts in sorted(shared.kernels)]
-
-
-def kernel_text(name: str, kind: str) -> str:
-    """The text of a kernel for one element type."""
-    text = (KERNELS / f"{name}.c").read_text()
-    for mark, functions in _MATH.items():
-        text = text.replace(mark, functions.get(kind, mark))
-    return text.replace("REAL", kind)
+    """Texts of the kernels of a file, each for one element type."""
+    found = []
+    for name, kind in sorted(shared.kernels):
+        text = (KERNELS / f"{name}.c").read_text()
+        for mark, functions in _MATH.items():
+            text = text.replace(mark, functions.get(kind, mark))
+        found.append(text.replace("REAL", kind))
+    return found

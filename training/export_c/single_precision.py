@@ -20,7 +20,7 @@ READINGS = 4096
 TOLERANCE = 1e-5
 
 
-def in_single_precision(model: Any, metadata: Mapping[str, str]) -> Any:
+def in_single_precision(model: Any, metadata: Mapping[str, str]) -> tuple[Any, float]:
     """The model in single precision, if this does not change estimates from single rows.
 
     The set posterior is in single precision as it is. Estimates from single rows are double in the
@@ -29,36 +29,22 @@ def in_single_precision(model: Any, metadata: Mapping[str, str]) -> Any:
 
     model: The model with its graph, which is not changed.
     metadata: The metadata of the file.
-    """
-    change = change_by_single_precision(model, metadata)
-    return narrowed(model) if change is not None and change < TOLERANCE else model
 
-
-def narrowed(model: Any) -> Any:
-    """A copy of the model in single precision."""
-    narrow = type(model)()
-    narrow.CopyFrom(model)
-    _narrow(narrow.graph)
-    return narrow
-
-
-def change_by_single_precision(model: Any, metadata: Mapping[str, str]) -> float | None:
-    """By how much single precision changes estimates from single rows, at most.
-
-    Returns: The largest change of a mean or standard deviation, in standard deviations of the
-    prior, of readings spread over the ranges of training; infinity where it changes which readings
-    are in range; None where nothing is in double precision, or there are no such estimates.
+    Returns: The model, and the largest change of a mean or standard deviation, in standard
+    deviations of the prior; infinity where it changes which readings are in range, and NaN where
+    nothing is in double precision, or there are no such estimates.
     """
     narrow = type(model)()
     narrow.CopyFrom(model)
     if not _narrow(narrow.graph) or "mean" not in [output.name for output in model.graph.output]:
-        return None
+        return model, float("nan")
     before, after = (_answers(m, metadata) for m in (model, narrow))
     inside = before["in_range"]
     if not np.array_equal(inside, after["in_range"]):
-        return float("inf")
+        return model, float("inf")
     changes = [np.abs(after[key] - before[key])[inside] for key in ("mean", "std")]
-    return float(np.max(changes / read_fields(metadata)["prior"].std))
+    change = float(np.max(changes / read_fields(metadata)["prior"].std))
+    return narrow if change < TOLERANCE else model, change
 
 
 def _answers(model: Any, metadata: Mapping[str, str]) -> dict[str, Floats]:

@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.onboard.set_contract import SET_SWITCH
 
 Output = tuple[int, list[Any]]  # Element type and shape of a graph's output
@@ -167,45 +166,6 @@ class Graph:
         last = self._nodes[-1]
         last.output[list(last.output).index(name)] = new
         self._names_of_nodes = {k: v for k, v in self._names_of_nodes.items() if name not in v}
-
-    def double(self, name: str) -> str:
-        """A value cast to float64."""
-        return self.op("Cast", name, to=11)
-
-    def single(self, name: str, out: str) -> str:
-        """A value cast to float32, under the name of an output."""
-        return self.op("Cast", name, out=out, to=1)
-
-    def scaled(self, x: str, mean: Floats, scale: Floats) -> str:
-        """`(x - mean) / scale`."""
-        return self.op("Div", self.op("Sub", x, self.constant(mean)), self.constant(scale))
-
-    def affine(self, x: str, weights: Any, bias: Any) -> str:
-        """`x @ weights + bias`."""
-        return self.op("Gemm", x, self.constant(weights), self.constant(bias))
-
-    def columns(self, x: str, first: int, last: int) -> str:
-        """Columns `first` to `last` (excluded)."""
-        ends = [self.constant(np.asarray([k], dtype=np.int64)) for k in (first, last, 1)]
-        return self.op("Slice", x, *ends)
-
-    def squared_distances(self, x: str, centres: Floats) -> str:
-        """Squared distances (n, m) from rows to centres (m, d), never below zero."""
-        own = self.op("ReduceSum", self.op("Mul", x, x), self._axis(1), keepdims=1)
-        cross = self.op("MatMul", x, self.constant(-2.0 * centres.T))
-        total = self.op("Add", self.op("Add", cross, own), self.constant((centres**2).sum(axis=1)))
-        return self.op("Max", total, self.constant(np.float64(0.0)))
-
-    def reduced(self, kind: str, x: str, axis: int) -> str:
-        """A reduction over one axis."""
-        return self.op(kind, x, self._axis(axis), keepdims=0)
-
-    def _axis(self, axis: int) -> str:
-        return self.constant(np.asarray([axis], dtype=np.int64))
-
-    def reshaped(self, x: str, *shape: int) -> str:
-        """A value in a new shape; 0 keeps a dimension, one -1 is computed."""
-        return self.op("Reshape", x, self.constant(np.asarray(shape, dtype=np.int64)))
 
     def default(self, name: str, value: Any) -> None:
         """Give an input of the graph a default value, for callers that do not feed it."""

@@ -136,6 +136,10 @@ class Value:
             names = self.graph.ops("Split", len(parts), self.name, sizes.name, axis=axis)
         return [self._output(name) for name in names]
 
+    def columns(self, first: int, last: int) -> Value:
+        """Columns `first` to `last` (excluded) of a matrix."""
+        return self.node("Slice", *(self.indices([k]) for k in (first, last, 1)))
+
     def last_columns(self, *sizes: int) -> list[Value]:
         """The last columns of a matrix, in parts of these sizes, after all columns before them."""
         starts = [sum(sizes[k:]) for k in range(len(sizes))]
@@ -208,6 +212,12 @@ def _function(kind: str) -> Callable[[Value], Value]:
 exp, log, sqrt = _function("Exp"), _function("Log"), _function("Sqrt")
 tanh, asinh, absolute = _function("Tanh"), _function("Asinh"), _function("Abs")
 floor = _function("Floor")
+
+
+def squared_distances(x: Value, centres: NDArray[Any]) -> Value:
+    """Squared distances (n, m) from rows (n, d) to centres (m, d), never below zero."""
+    total = x @ (-2.0 * centres.T) + (x * x).sum(axis=1, keepdims=True)
+    return maximum(total + (centres**2).sum(axis=1), 0.0)
 
 
 def softmax(x: Value, axis: int) -> Value:

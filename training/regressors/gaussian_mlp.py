@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from soilml.arrays import Floats
-from training.onnx_graph.builder import Graph
+from training.onnx_graph.value import Value, gemm, tanh
 from training.regressors.gaussian_regressor import GaussianRegressor, Groups, Progress
 from training.regressors.tanh_network import TanhNetwork, evaluate_layers, layer_pairs
 
@@ -96,12 +96,12 @@ class GaussianMLP(GaussianRegressor):
         q = both.shape[1] // 2
         return both[:, :q], both[:, q:]
 
-    def _add_standardised_outputs(self, graph: Graph, x: str) -> tuple[str, str]:
+    def _add_standardised_outputs(self, x: Value) -> tuple[Value, Value]:
         *inner, (weights, bias) = layer_pairs(self.layers_)
         for inner_weights, inner_bias in inner:
-            x = graph.op("Tanh", graph.affine(x, inner_weights, inner_bias))
-        both, q = graph.affine(x, weights, bias), weights.shape[1] // 2
-        return graph.columns(both, 0, q), graph.columns(both, q, 2 * q)
+            x = tanh(gemm(x, inner_weights, inner_bias))
+        mean, log_variance = gemm(x, weights, bias).split(2, axis=1)
+        return mean, log_variance
 
     def fitted_settings(self) -> str:
         """Layer widths."""

@@ -13,7 +13,7 @@ from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from soilml.arrays import Floats
-from training.onnx_graph.builder import Graph
+from training.onnx_graph.value import Value, exp, maximum, minimum
 
 Groups = NDArray[np.int64]
 #: Called with the steps done and the total number of steps.
@@ -99,16 +99,11 @@ class GaussianHead:
             mean, std = mean[:, 0], std[:, 0]
         return (mean, std) if return_std else mean
 
-    def add_to_graph(self, graph: Graph, mean: str, log_variance: str) -> tuple[str, str]:
-        """Add the same conversion to an ONNX graph; names of mean and std, (n, q)."""
-        scaled = graph.op("Mul", mean, graph.constant(self.scaling.scale))
-        raised = graph.op("Max", log_variance, graph.constant(self.low))
-        clipped = graph.op("Min", raised, graph.constant(self.high))
-        std = graph.op("Exp", graph.op("Mul", clipped, graph.constant(np.float64(0.5))))
-        return (
-            graph.op("Add", scaled, graph.constant(self.scaling.mean)),
-            graph.op("Mul", std, graph.constant(self.scaling.scale)),
-        )
+    def add_to_graph(self, mean: Value, log_variance: Value) -> tuple[Value, Value]:
+        """Add the same conversion to an ONNX graph; mean and std, (n, q)."""
+        clipped = minimum(maximum(log_variance, self.low), self.high)
+        std = exp(clipped * 0.5) * self.scaling.scale
+        return mean * self.scaling.scale + self.scaling.mean, std
 
 
 class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  # type: ignore[misc]
@@ -140,8 +135,8 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
         """Mean and log-variance (n, q)."""
 
     @abstractmethod
-    def _add_standardised_outputs(self, graph: Graph, x: str) -> tuple[str, str]:
-        """Add the same to an ONNX graph: names of mean and log-variance (n, q)."""
+    def _add_standardised_outputs(self, x: Value) -> tuple[Value, Value]:
+        """Add the same to an ONNX graph, in double precision."""
 
     def _input_factor(self) -> float:
         """Factor on standardised inputs in the graph."""
@@ -198,11 +193,10 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
         self.head_ = GaussianHead.of(self.y_scaling_, log_variance, y.ndim == 1)
         return x, z
 
-    def add_to_graph(self, graph: Graph, features: str) -> tuple[str, str]:
-        """Add the fitted regressor to an ONNX graph; names of mean and std, (n, q)."""
-        scale = self.x_scaling_.scale / self._input_factor()
-        x = graph.scaled(features, self.x_scaling_.mean, scale)
-        return self.head_.add_to_graph(graph, *self._add_standardised_outputs(graph, x))
+    def add_to_graph(self, features: Value) -> tuple[Value, Value]:
+        """Add the fitted regressor to an ONNX graph; mean and std, (n, q), of features (n, d)."""
+        x = (features - self.x_scaling_.mean) / (self.x_scaling_.scale / self._input_factor())
+        return self.head_.add_to_graph(*self._add_standardised_outputs(x))
 
     def predict(self, X: Any, return_std: bool = False) -> Any:
         """Predict rows X (n, d).
@@ -248,9 +242,8 @@ class FeatureSubset:
         """Mean (n, q); with `return_std` a tuple with the standard deviation."""
         return self.model.predict(self.select(features), return_std=return_std)
 
-    def add_to_graph(self, graph: Graph, features: str) -> tuple[str, str]:
-        """Add the regressor to an ONNX graph; names of mean and std, (n, q)."""
+    def add_to_graph(self, features: Value) -> tuple[Value, Value]:
+        """Add the regressor to an ONNX graph; mean and std, (n, q), of all features (n, d)."""
         if self.columns is not None:
-            columns = graph.constant(np.asarray(self.columns, dtype=np.int64))
-            features = graph.op("Gather", features, columns, axis=1)
-        return self.model.add_to_graph(graph, features)
+            features = features.take(self.columns, axis=1)
+        return self.model.add_to_graph(features)

@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from soilml.arrays import Floats
-from training.onnx_graph.builder import Graph
+from training.onnx_graph.value import Value, gemm
 from training.regressors.gaussian_regressor import (
     GaussianRegressor,
     Groups,
@@ -66,6 +66,6 @@ class LinearGaussian(GaussianRegressor):
     def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
         return x @ self.weights_ + self.bias_, self.log_variance(x)
 
-    def _add_standardised_outputs(self, graph: Graph, x: str) -> tuple[str, str]:
-        mean = graph.affine(x, self.weights_, self.bias_)
-        return mean, graph.affine(x, self.log_variance_weights_, self.log_variance_bias_)
+    def _add_standardised_outputs(self, x: Value) -> tuple[Value, Value]:
+        mean = gemm(x, self.weights_, self.bias_)
+        return mean, gemm(x, self.log_variance_weights_, self.log_variance_bias_)

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from soilml.arrays import Floats
-from training.onnx_graph.builder import Graph
+from training.onnx_graph.value import Value, exp, gemm, squared_distances
 from training.regressors.gaussian_regressor import (
     GaussianRegressor,
     Groups,
@@ -137,11 +137,10 @@ class LSSVM(GaussianRegressor):
         """With x and centres divided by sqrt(2) width the kernel is exp(-|x - c|^2)."""
         return float(1.0 / (np.sqrt(2.0) * self.width_))
 
-    def _add_standardised_outputs(self, graph: Graph, x: str) -> tuple[str, str]:
-        squared = graph.squared_distances(x, self.centres_ * self._input_factor())
-        kernel = graph.op("Exp", graph.op("Neg", squared))
-        both, q = graph.affine(kernel, self.weights_, self.bias_), len(self.bias_) // 2
-        return graph.columns(both, 0, q), graph.columns(both, q, 2 * q)
+    def _add_standardised_outputs(self, x: Value) -> tuple[Value, Value]:
+        kernel = exp(-squared_distances(x, self.centres_ * self._input_factor()))
+        mean, log_variance = gemm(kernel, self.weights_, self.bias_).split(2, axis=1)
+        return mean, log_variance
 
     def fitted_settings(self) -> str:
         """Number of centres, gamma and width."""

@@ -12,13 +12,9 @@ from sklearn.base import BaseEstimator, clone, is_regressor
 from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.optional_imports import need
-from training.onnx_graph.builder import OPSET, Graph, session_of
-from training.regressors.gaussian_regressor import (
-    GaussianRegressor,
-    Groups,
-    Progress,
-    folds_of,
-)
+from training.onnx_graph.builder import OPSET, session_of
+from training.onnx_graph.value import Value, gemm
+from training.regressors.gaussian_regressor import GaussianRegressor, Groups, Progress, folds_of
 from training.regressors.linear_gaussian import LinearGaussian
 
 #: Largest difference of the graph from the regressor, in standard deviations of the outputs:
@@ -78,7 +74,7 @@ class ScikitLearn(GaussianRegressor):
     def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
         return _mean(self.mean_, x), self.variance_.log_variance(x)
 
-    def _add_standardised_outputs(self, graph: Graph, x: str) -> tuple[str, str]:
+    def _add_standardised_outputs(self, x: Value) -> tuple[Value, Value]:
         need("skl2onnx", "train", "sklearn", what="a regressor of scikit-learn in a model file")
         from skl2onnx import to_onnx
 
@@ -100,10 +96,9 @@ class ScikitLearn(GaussianRegressor):
                 f"{name}: what skl2onnx writes differs from it by {apart.max():.2g} standard "
                 "deviations of the outputs; take another regressor, such as an ensemble of trees"
             )
-        single = graph.op("Cast", x, to=1)
-        mean = graph.reshaped(graph.double(graph.inline(model, single)), -1, found.shape[-1])
-        variance = self.variance_
-        return mean, graph.affine(x, variance.log_variance_weights_, variance.log_variance_bias_)
+        output = Value(x.graph, x.graph.inline(model, x.astype(np.float32).name))
+        mean, variance = output.astype(np.float64).reshape(-1, found.shape[-1]), self.variance_
+        return mean, gemm(x, variance.log_variance_weights_, variance.log_variance_bias_)
 
     def _blank(self) -> Any:
         """The regressor, not fitted."""

@@ -45,30 +45,15 @@ ROW_INPUTS = (*READING_INPUTS, *STD_INPUTS, *OPERATING_STD_INPUTS)
 
 @dataclass(frozen=True)
 class SetPosteriorGraph:
-    """A family of wheels with its response surface, and what a file assumes of readings.
-
-    Attributes
-    ----------
-    family, response
-        The wheels, and the surface that was learned of them.
-    limits
-        The largest accepted misfits.
-    noise
-        That of the file.
-    small
-        Whether it is for a microcontroller: fewer points, smaller systems.
-    scales
-        Sizes of the model's errors, and their probabilities before a set is read.
-    sensor_errors
-        Standard deviations of errors of the sensors that are not the family's typical ones.
-    """
+    """A family of wheels with its response surface, and what a file assumes of readings."""
 
     family: WheelFamily
-    response: Response
-    limits: MisfitLimits
-    noise: FileNoise = field(default_factory=dict)
-    small: bool = False
-    scales: ErrorScales = USUAL_SCALES
+    response: Response  # the surface that was learned of the wheels
+    limits: MisfitLimits  # largest accepted misfits
+    noise: FileNoise = field(default_factory=dict)  # of the file
+    small: bool = False  # for a microcontroller: fewer points, smaller systems
+    scales: ErrorScales = USUAL_SCALES  # of the model's errors
+    #: standard deviations of errors of the sensors that are not the family's typical ones
     sensor_errors: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -95,14 +80,10 @@ class SetPosteriorGraph:
         """Outputs of the graph."""
         q = self.family.targets
         of_set: dict[str, Output] = {
-            "mean": (FLOAT, [q]),
-            "std": (FLOAT, [q]),
-            "low": (FLOAT, [q]),
-            "high": (FLOAT, [q]),
+            **{name: (FLOAT, [q]) for name in ("mean", "std", "low", "high")},
             "covariance": (FLOAT, [q, q]),
             "in_range": (BOOL, [1]),
-            "abstains": (BOOL, [q]),
-            "at_edge": (BOOL, [q]),
+            **{name: (BOOL, [q]) for name in ("abstains", "at_edge")},
             "misfit": (FLOAT, [1]),
         }
         state: tuple[Output, ...] = ((FLOAT, ["kept_out", self.columns]), (FLOAT, [3]))
@@ -143,16 +124,15 @@ class SetPosteriorGraph:
         axes = family.axes[: family.free]
         usual = family.model_errors()
         polynomials = Polynomials.of(axes, terms if nearly is None else nearly.sampled)
-        likelihood = Likelihood(
-            polynomials, rows, state, inputs[MODEL_ERROR_INPUT], self.scales,
-            tuple(usual[name] > 0.0 for name in MODEL_ERROR_COLUMNS), nearly,
-        )  # fmt: skip
         consistency = self.limits.of_set(counts)
         sizes = SIZES_SMALL if self.small else sample_sizes(len(axes))
+        likelihood = Likelihood(
+            polynomials, rows, state, inputs[MODEL_ERROR_INPUT], self.scales,
+            tuple(usual[name] > 0.0 for name in MODEL_ERROR_COLUMNS), nearly, sizes, family.targets,
+        )  # fmt: skip
         *sample, grown = likelihood.sampled(
-            sizes, prior_draws(graph, axes, polynomials.order, sizes.prior),
+            prior_draws(graph, axes, polynomials.order, sizes.prior),
             adapted_draws(graph, polynomials.unknowns, sizes.adapted), consistency[0],
-            family.targets,
         )  # fmt: skip
         grown.node("Identity").named(outputs[0])
         add_posterior_outputs(

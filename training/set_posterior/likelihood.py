@@ -15,7 +15,6 @@ A point in three dimensions tells more than one in five.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
 from operator import add, mul
@@ -142,34 +141,19 @@ def _joined(state: Value, columns: Value, used: Value, errors: list[int]) -> lis
 
 @dataclass(frozen=True)
 class Likelihood:
-    """What is sampled of a set's readings.
+    """What is sampled of a set's readings."""
 
-    Attributes
-    ----------
-    polynomials
-        Monomials of the sampled unknowns.
-    rows, state
-        New readings, and the residual system (kept, terms + errors) of earlier ones.
-    size
-        Of the errors of the model, (1,).
-    scales, present
-        Their sizes where that is inferred, and which of `MODEL_ERROR_COLUMNS` the model can have.
-    nearly_known
-        Unknowns in which residuals are linear; None where there are none.
-    """
+    polynomials: Polynomials  # monomials of the sampled unknowns
+    rows: ResidualRows  # new readings
+    state: Value  # residual system (kept, terms + errors) of earlier ones
+    size: Value  # of the errors of the model, (1,)
+    scales: ErrorScales  # their sizes where that is inferred
+    present: tuple[bool, ...]  # which of `MODEL_ERROR_COLUMNS` the model can have
+    nearly_known: Linear | None  # unknowns in which residuals are linear, if there are some
+    sizes: SampleSizes
+    targets: int  # estimated unknowns
 
-    polynomials: Polynomials
-    rows: ResidualRows
-    state: Value
-    size: Value
-    scales: ErrorScales
-    present: tuple[bool, ...]
-    nearly_known: Linear | None
-
-    def sampled(
-        self, sizes: SampleSizes, prior: ProposalDraws, adapted: ProposalDraws, limit: Value,
-        targets: int,
-    ) -> list[Value]:  # fmt: skip
+    def sampled(self, prior: ProposalDraws, adapted: ProposalDraws, limit: Value) -> list[Value]:
         """Points (1 + p, n), weights (1, n), least misfit (1,), and the state with the new rows."""
         system = {
             "state": self.state, "columns": self.rows.columns_at(None), "used": self.rows.used,
@@ -188,10 +172,11 @@ class Likelihood:
             "present": self.size.indices(present),
             "scales": constant(graph, of_columns[:, present], name="scales"),
             "log_probabilities": constant(graph, np.log(probabilities), name="log_probabilities"),
-            "rounds": self.size.indices([sizes.rounds]), "targets": self.size.indices([targets]),
+            "rounds": self.size.indices([self.sizes.rounds]),
+            "targets": self.size.indices([self.targets]),
         }  # fmt: skip
         soil, *first = composite(
-            "FirstRound", ["soil", "solved", "free", "outside"], self._first_body(),
+            "FirstRound", ["soil", "solved", "free", "outside"], self._first_body,
             **system, **given, **dict(zip(("draws", "t", "log_prior"), prior, strict=True)), **of_c,
         )  # fmt: skip
         if linear is not None:
@@ -199,47 +184,39 @@ class Likelihood:
         system["columns"] = self.rows.columns_at(soil)
         return composite(
             "Posterior", ["points", "weights", "misfit", "grown"],
-            self._posterior_body(sizes, targets), **system, **given, size=self.size, limit=limit,
+            self._posterior_body, **system, **given, size=self.size, limit=limit,
             prior=prior.normal, **dict(zip(("solved", "free", "outside"), first, strict=True)),
             **adapted._asdict(), **of_scales,
         )  # fmt: skip
 
-    def _first_body(self) -> Callable[..., list[Value]]:
+    def _first_body(
+        self, state: Value, columns: Value, used: Value, draws: Value, t: Value, log_prior: Value,
+        unknowns: Value | None = None, **_: Value,
+    ) -> list[Value]:  # fmt: skip
         """From readings to the first round, with errors linear in the middle of the prior."""
+        whole, sensors = _joined(state, columns, used, [OF_SENSORS])
+        whole, taken = self._in_unknowns(whole, sensors, unknowns)
+        system = integrate_out(concat([whole, taken], axis=1), self._taken)
+        return first_round(self.polynomials, system, draws, t, log_prior)
 
-        def body(
-            state: Value, columns: Value, used: Value, draws: Value, t: Value, log_prior: Value,
-            unknowns: Value | None = None, **_: Value,
-        ) -> list[Value]:  # fmt: skip
-            whole, sensors = _joined(state, columns, used, [OF_SENSORS])
-            whole, taken = self._in_unknowns(whole, sensors, unknowns)
-            system = integrate_out(concat([whole, taken], axis=1), self._taken)
-            return first_round(self.polynomials, system, draws, t, log_prior)
-
-        return body
-
-    def _posterior_body(self, sizes: SampleSizes, targets: int) -> Callable[..., list[Value]]:
+    def _posterior_body(
+        self, state: Value, columns: Value, used: Value, size: Value, limit: Value, prior: Value,
+        solved: Value, free: Value, outside: Value, normal: Value, t: Value, log_density: Value,
+        unknowns: Value | None = None, **_: Value,
+    ) -> list[Value]:  # fmt: skip
         """From readings, with errors linear at a soil, to the sample of the posterior."""
-
-        def body(
-            state: Value, columns: Value, used: Value, size: Value, limit: Value, prior: Value,
-            solved: Value, free: Value, outside: Value, normal: Value, t: Value,
-            log_density: Value, unknowns: Value | None = None, **_: Value,
-        ) -> list[Value]:  # fmt: skip
-            whole, sensors, model = _joined(state, columns, used, [OF_SENSORS, OF_MODEL])
-            grown = concat([whole, sensors, model], axis=1)
-            present = np.flatnonzero(self.present).tolist()
-            whole, taken = self._in_unknowns(whole, sensors, unknowns)
-            model = model.take(present, axis=1)
-            system = integrate_out(concat([whole, model, taken], axis=1), self._taken)
-            system, model = system.last_columns(len(present))
-            mixture = scale_mixture(system, model, size, self.scales, self.present)
-            first = (prior, solved, free, outside)
-            draws = ProposalDraws(normal, t, log_density)
-            found = adapted_rounds(self.polynomials, mixture, limit, targets, sizes, first, draws)
-            return [*found, grown]
-
-        return body
+        whole, sensors, model = _joined(state, columns, used, [OF_SENSORS, OF_MODEL])
+        grown = concat([whole, sensors, model], axis=1)
+        present = np.flatnonzero(self.present).tolist()
+        whole, taken = self._in_unknowns(whole, sensors, unknowns)
+        model = model.take(present, axis=1)
+        system = integrate_out(concat([whole, model, taken], axis=1), self._taken)
+        system, model = system.last_columns(len(present))
+        mixture = scale_mixture(system, model, size, self.scales, self.present)
+        first, draws = (prior, solved, free, outside), ProposalDraws(normal, t, log_density)
+        sizes, targets = self.sizes, self.targets
+        found = adapted_rounds(self.polynomials, mixture, limit, targets, sizes, first, draws)
+        return [*found, grown]
 
     @property
     def _taken(self) -> int:

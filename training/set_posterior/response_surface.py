@@ -196,10 +196,8 @@ def fit_response(family: WheelFamily, settings: ResponseSettings, progress: Prog
 
 def carried_shares(family: WheelFamily, seed: int) -> tuple[Floats, Floats]:
     """A few designs (n, d), and the share of the soils of the prior that carry each, (n,)."""
-    designs, x = (
-        family.designs(CHECKED_DESIGNS, seed),
-        prior_points(family.axes, family.free, SELECTION_POINTS, seed),
-    )
+    designs = family.designs(CHECKED_DESIGNS, seed)
+    x = prior_points(family.axes, family.free, SELECTION_POINTS, seed)
     return designs, np.isfinite(family.responses(designs, x[None])).all(axis=2).mean(axis=1)
 
 

@@ -24,6 +24,14 @@ from training.slip_step.graph import start_of
 IDENTITY = ("graph_sha256", "metadata_sha256", "case_sha256")
 OUTPUTS = ("speed", "slip", "probability", "flags", "grounds_out", "recent_out")
 
+CODES = (
+    ("OK", 0, "answered"),
+    ("NO_ANSWER", 1, "a flag says why there is no answer: speed and slip mean nothing"),
+    ("BAD_READING", -1, "a reading is not finite, or not possible"),
+    ("NOT_STARTED", -2, "the state was not started, is damaged, or is of another model file"),
+    ("NOT_FINITE", -3, "the answer would not be finite"),
+)
+
 
 def write_slip_c(
     model: Any, filter_: SlipFilter, name: str, origin: str, metadata: Mapping[str, str]
@@ -61,6 +69,7 @@ def write_slip_c(
         "columns": start.shape[1],
         "recent": RECENT,
         "quantiles": len(QUANTILES),
+        "codes": CODES,
         "flags": FLAGS,
         "function": function,
         "arrays": arrays,

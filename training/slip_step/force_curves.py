@@ -56,7 +56,7 @@ class ForceCurves:
         m = len(self.table.slip)
         scale = self.load.take([wheel], 0) * float(self.table.radius[wheel])
         torque = self._read(self.table.torque[self.table.kind[wheel]], wheel)
-        low, high = columns(torque, 0, m - 1), columns(torque, 1, m)
+        low, high = torque.columns(0, m - 1), torque.columns(1, m)
         return (low * hot).sum(1, True) * scale, (high * hot).sum(1, True) * scale
 
     def _read(self, values: Floats, wheel: int) -> Value:
@@ -73,11 +73,6 @@ class ForceCurves:
 def slip_of(ratio: Value) -> Value:
     """Slip from v / (r omega), above zero."""
     return where(ratio > 1.0, 1.0 / ratio.clip(1.0) - 1.0, 1.0 - ratio)
-
-
-def columns(x: Value, first: int, last: int) -> Value:
-    """Some columns of a matrix."""
-    return Value(x.graph, x.graph.columns(x.name, first, last), x.dtype)
 
 
 def _hats(graph: Graph, nodes: Floats, places: Value) -> Value:

@@ -29,7 +29,7 @@ from soilml.slip_filter.filter import (
 )
 from training.onnx_graph.builder import FLOAT, Graph
 from training.onnx_graph.value import Value, absolute, concat, constant, exp, log, sqrt, where
-from training.slip_step.force_curves import RATIO_ENDS, ForceCurves, columns, slip_of
+from training.slip_step.force_curves import RATIO_ENDS, ForceCurves, slip_of
 
 #: Places of the distribution function of the speed, in standard deviations about the mean.
 PLACES = np.arange(-4.0, 4.01, 0.125)
@@ -172,8 +172,8 @@ class _Step:
         hot = concat([second + begin, rest], 1)
         last = np.eye(1, m - 1, m - 2)
         hot = hot + (1.0 - known) * constant(graph, last)
-        low = (columns(pull, 0, m - 1) * hot).sum(1, True)
-        high = (columns(pull, 1, m) * hot).sum(1, True)
+        low = (pull.columns(0, m - 1) * hot).sum(1, True)
+        high = (pull.columns(1, m) * hot).sum(1, True)
         rise = (high - low).clip(1e-3 * float(self.filter.weight))
         share = where(known > 0.5, ((needed - low) / rise).clip(0.0, 1.0), 1.0)
         missing = where(known > 0.5, 0.0 * rise, needed - pull.reduce("ReduceMax", 1, True))
@@ -290,7 +290,7 @@ class _Step:
         )
         distribution = (weight * under).sum(0, True)  # (1, places)
         count = len(PLACES)
-        low, high = columns(distribution, 0, count - 1), columns(distribution, 1, count)
+        low, high = distribution.columns(0, count - 1), distribution.columns(1, count)
         found = []
         for q in QUANTILES:
             share = ((q - low) / (high - low).clip(TINY)).clip(0.0, 1.0)

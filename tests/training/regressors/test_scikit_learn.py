@@ -56,8 +56,9 @@ def test_what_is_no_regressor_of_scikit_learn_is_refused(name):
 
 def test_what_cannot_be_written_is_refused_by_name():
     from training.onnx_graph.builder import Graph
+    from training.onnx_graph.value import Value
 
     x = np.linspace(0.0, 1.0, 30)[:, None]
     ridge = ScikitLearn(KernelRidge()).fit(x, x[:, 0])
     with pytest.raises(InputError, match="KernelRidge cannot be written as ONNX"):
-        ridge.add_to_graph(Graph(), "x")
+        ridge.add_to_graph(Value(Graph(), "x", np.float64))
