@@ -174,7 +174,7 @@ def _take_regressor(settings: Settings, seed: int) -> GaussianRegressor:
 
 
 def _take_parameter(settings: Settings, key: str, default: Any) -> Any:
-    """A hyperparameter: a name, a table, whole numbers, a whole number, or a finite number."""
+    """A hyperparameter: text, a table, whole numbers, a whole number, or a finite number."""
     if isinstance(default, str):
         return settings.text(key)
     if key == "parameters":

@@ -144,7 +144,7 @@ def _output(metavar: str, path: str) -> OutputFile:
 def is_json(args: argparse.Namespace) -> bool:
     """Whether the output is JSON, by its ending; raises `InputError` where --format differs."""
     found = args.out.lower().endswith(".json")
-    wanted = {"json": True, "csv": False}.get(args.format or "", found)
+    wanted = {"json": True, "csv": False}.get(getattr(args, "format", None) or "", found)
     if wanted != found:
         raise InputError(f"--format {args.format} and --out {args.out} differ: omit --format")
     return bool(found)

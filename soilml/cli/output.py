@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from soilml.cli.options import REPORT_FILES, input_files
+from soilml.cli.options import REPORT_FILES, input_files, is_json
 from soilml.cli.screen import SCREEN, is_terminal
 from soilml.errors import InputError
 from soilml.io.atomic_files import write_files
@@ -50,24 +50,40 @@ def write_columns(
     tell_columns(columns, out)
 
 
-def write_rows(
+def deliver(
+    args: argparse.Namespace,
     report: Report,
-    columns: Mapping[str, Any],
-    out: str | None,
-    picture: str | None,
+    content: Mapping[str, Any] | None = None,
+    columns: Mapping[str, Any] | None = None,
+    read: Iterable[str] = (),
+    others: Mapping[str, Content] | None = None,
 ) -> None:
-    """Write the columns to the CSV file `out` and the report's picture to a PNG file; say the rest.
+    """Write --out, --picture and --report as one set, and show the result.
 
-    None as a path is an option that was not given; without `out`, the columns go into a pipe.
+    content: What JSON has, in SI units; by default the columns.
+    columns: Rows of a table: --out is then CSV, unless it is FILE.json, and so is what is printed
+        into a pipe. Otherwise --out is JSON.
+    read: Input files that no argument names.
+    others: What is written to --out in the place of these, and further files, by path.
     """
-    write_set({out: partial(save_columns, columns), picture: report.pictures[0].save})
-    content = {name: np.asarray(values).tolist() for name, values in columns.items()}
-    show_rows(report, columns, content, out)
-
-
-def write_set(contents: Mapping[str | None, Content]) -> None:
-    """Write files as one set; None as a path is an option that was not given."""
-    write_files({Path(path): content for path, content in contents.items() if path is not None})
+    table = {name: np.asarray(values).tolist() for name, values in (columns or {}).items()}
+    content = table if content is None else content
+    out, picture, folder = (getattr(args, n, None) for n in ("out", "picture", "report"))
+    files: dict[Path, Content] = {}
+    if out is not None:
+        rows = None if columns is None or is_json(args) else columns
+        files[Path(out)] = json_text(content) if rows is None else partial(save_columns, rows)
+    if picture is not None:
+        files[Path(picture)] = report.pictures[0].save
+    if folder is not None:
+        names = (REPORT_FILES[0], REPORT_FILES[1])
+        files |= report_texts(report, origin_of(args, read), content, names, Path(folder))
+    files |= {Path(path): own for path, own in (others or {}).items()}
+    write_files(files, folders=[folder])
+    if columns is None or (not SCREEN.form and (out or folder)):
+        show_result(report, {k: v for k, v in content.items() if k != "draws"})  # for files
+    else:
+        show_rows(report, columns, content)
 
 
 def save_columns(columns: Mapping[str, Any], path: Path) -> None:
@@ -103,17 +119,12 @@ def show_result(report: Report, content: Mapping[str, Any]) -> None:
     show((replace(report, remarks=()) if SCREEN.quiet else report).text(SCREEN.verbose))
 
 
-def show_rows(
-    report: Report, columns: Mapping[str, Any], content: Any, out: str | None = None
-) -> None:
-    """Print CSV into a pipe, with remarks on standard error; else as `show_result`.
-
-    out: File that has the columns already, which is then all that is said beside the remarks.
-    """
-    if out is None and SCREEN.form_of_rows() != "csv":
+def show_rows(report: Report, columns: Mapping[str, Any], content: Any) -> None:
+    """Print CSV into a pipe, with remarks on standard error; else as `show_result`."""
+    if SCREEN.form_of_rows() != "csv":
         show_result(report, content)
         return
-    tell_columns(columns, out)
+    tell_columns(columns, None)
     for text in [*(f"! {remark}" for remark in report.remarks), *report.next_steps]:
         tell(text)
 
@@ -145,23 +156,3 @@ def origin_of(args: argparse.Namespace, files: Iterable[str] = ()) -> Provenance
     """The command and its input files, of which `files` are some that no argument names."""
     read = (str(split_sheet(file)[0]) for file in (*input_files(args), *files))
     return Provenance.of(getattr(args, "command_line", []), read)
-
-
-def write_with_report(
-    args: argparse.Namespace,
-    contents: Mapping[str | None, Content],
-    build: Callable[[], tuple[Report, Mapping[str, Any]]],
-    read: Iterable[str] = (),
-) -> None:
-    """Write the outputs of a command, and those of --report, as one set.
-
-    contents: What is written to each path; None as a path is an option that was not given.
-    build: Gives the report and the result in SI units; called where --report is given.
-    read: Input files that no argument names.
-    """
-    files = {Path(path): content for path, content in contents.items() if path is not None}
-    if args.report is not None:
-        report, content = build()
-        names = (REPORT_FILES[0], REPORT_FILES[1])
-        files |= report_texts(report, origin_of(args, read), content, names, Path(args.report))
-    write_files(files, folders=[args.report])

@@ -9,16 +9,12 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.progress import Progress
-
-    from soilml.onboard.estimator import Estimator
-    from soilml.onboard.model_file import Session
 
 #: Seconds before the first line, and between two lines, where standard error is no terminal.
 FIRST_LINE, BETWEEN_LINES = 2.0, 20.0
@@ -55,8 +51,17 @@ def working(text: str) -> Iterator[None]:
 def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
     """A function (stage, done, total): a bar for each stage on a terminal, otherwise lines."""
     if not sys.stderr.isatty():
-        with _stage_lines() as announce:
-            yield announce
+        stages: dict[str, Callable[[int], None]] = {}
+        started = time.monotonic()
+
+        def announce(text: str, done: int, total: int) -> None:
+            if text not in stages:
+                stages[text] = _lines(text, total, BETWEEN_LINES)
+                if time.monotonic() > started + FIRST_LINE:
+                    _say(f"{text} ...")
+            stages[text](done)
+
+        yield announce
         return
     tasks: dict[str, Any] = {}
     with _bars(counted=False, transient=False) as progress:
@@ -67,58 +72,6 @@ def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
             progress.update(tasks[text], completed=done, total=total)
 
         yield update
-
-
-@contextmanager
-def _stage_lines() -> Iterator[Callable[[str, int, int], None]]:
-    """A line as each stage starts; the first one after `FIRST_LINE` seconds, as everywhere."""
-    stages: dict[str, Callable[[int], None]] = {}
-    said, lock = False, threading.Lock()
-
-    def first() -> None:
-        nonlocal said
-        with lock:
-            said = True
-            for text in list(stages)[-1:]:
-                _say(f"{text} ...")
-
-    def announce(text: str, done: int, total: int) -> None:
-        with lock:
-            if text not in stages:
-                stages[text] = _lines(text, total, BETWEEN_LINES)
-                if said:
-                    _say(f"{text} ...")
-            stages[text](done)
-
-    timer = threading.Timer(FIRST_LINE, first)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield announce
-    finally:
-        timer.cancel()
-
-
-@contextmanager
-def row_progress(text: str, estimator: Estimator, rows: int) -> Iterator[Estimator]:
-    """The same estimator, which moves a bar on; it will give about `rows` rows to its graph."""
-    with progress_bar(text, rows) as done:
-        counted = _CountedRows(estimator.session, done)
-        yield replace(estimator, session=cast("Session", counted))
-
-
-class _CountedRows:
-    """A session that tells how many rows it was given."""
-
-    def __init__(self, session: Session, done: Callable[[int], None]) -> None:
-        self._session, self._done, self._rows = session, done, 0
-
-    def run(self, outputs: Sequence[str], feed: Mapping[str, Any]) -> list[Any]:
-        """Run the graph; its first input has a number for each row."""
-        found: list[Any] = self._session.run(outputs, feed)
-        self._rows += len(next(iter(feed.values())))
-        self._done(self._rows)
-        return found
 
 
 def _bars(*, counted: bool, transient: bool) -> Progress:

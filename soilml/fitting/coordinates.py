@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,40 +38,20 @@ class Coordinate:
     the prior, from 0 to 1. In an analysis of gaps the size of an effect has x in reference sizes,
     and a shape coefficient is its own x: `prior` is then a scale alone, from the value at x = 0 to
     the one at x = 1.
-
-    Attributes
-    ----------
-    path
-        As in `Case.parameters`: `cohesion`, `slip-sinkage.n1`, `grousers@lugged.height`.
-    unit
-        SI unit of its values.
-    prior
-        Maps x to the value: the case's prior, the one that is assumed, or a scale.
-    nominal
-        The value that the case gives it.
-    assumed
-        Whether the case has no prior for it.
-    normal_std
-        Standard deviation of a normal density of the value about zero that is to be
-        multiplied with that of the prior; None where there is none.
-    lower, upper
-        Bounds of x.
-    is_shape
-        Whether it is a shape coefficient of an effect's law.
-    of_candidate
-        Whether it is of an effect that a hypothesis adds, and not of the case.
     """
 
-    path: str
-    unit: str
-    prior: Prior
-    nominal: float = 0.0
-    assumed: bool = False
+    path: str  # as in `Case.parameters`: `cohesion`, `slip-sinkage.n1`, `grousers@lugged.height`
+    unit: str  # SI unit of its values
+    prior: Prior  # maps x to the value: the case's prior, the one that is assumed, or a scale
+    nominal: float = 0.0  # value that the case gives it
+    assumed: bool = False  # whether the case has no prior for it
+    #: Standard deviation of a normal density of the value about zero that is to be multiplied with
+    #: that of the prior; None where there is none
     normal_std: float | None = None
-    lower: float = 0.0
+    lower: float = 0.0  # bounds of x
     upper: float = 1.0
-    is_shape: bool = False
-    of_candidate: bool = False
+    is_shape: bool = False  # whether it is a shape coefficient of an effect's law
+    of_candidate: bool = False  # whether it is of an effect that a hypothesis adds
 
     @property
     def effect(self) -> str:
@@ -162,38 +142,20 @@ def size_coordinate(effect: type[Effect], calibration: float | None) -> Coordina
     `calibration` is the prior standard deviation of the size in its own unit; None: no prior.
     """
     size = effect.about.size
-    parameter = declared(effect)[size]
-    unit = effect.about.reference[size]
+    parameter, unit = declared(effect)[size], effect.about.reference[size]
     lower, upper = sorted((parameter.lower / unit, parameter.upper / unit))
-    return Coordinate(
-        f"{effect.name}.{size}",
-        parameter.unit,
-        Prior(0.0, unit),
-        normal_std=calibration,
-        lower=lower,
-        upper=upper,
-        of_candidate=True,
-    )
+    own = Coordinate(f"{effect.name}.{size}", parameter.unit, Prior(0.0, unit), of_candidate=True)
+    return replace(own, normal_std=calibration, lower=lower, upper=upper)
 
 
 def shape_coordinates(effect: type[Effect]) -> list[Coordinate]:
     """The coordinates of an effect's shape coefficients; none where its law has no uncertainty."""
     coordinates = []
     for name in effect.law_terms if issubclass(effect, SlipLoadScaling) else ():
-        std = SHAPE_STD[name]
-        bound = min(declared(effect)[name].upper, 4.0 * std)
-        coordinates.append(
-            Coordinate(
-                f"{effect.name}.{name}",
-                "1",
-                Prior(0.0, 1.0),
-                normal_std=std,
-                lower=-bound,
-                upper=bound,
-                is_shape=True,
-                of_candidate=True,
-            )
-        )
+        std, path = SHAPE_STD[name], f"{effect.name}.{name}"
+        most = min(declared(effect)[name].upper, 4.0 * std)
+        scale = Coordinate(path, "1", Prior(0.0, 1.0), normal_std=std, lower=-most, upper=most)
+        coordinates.append(replace(scale, is_shape=True, of_candidate=True))
     return coordinates
 
 

@@ -179,7 +179,7 @@ def _learned_columns(learned: Remainder, readings: Readings, channel: int) -> Fl
 
 def included_discrepancy(case: Case, readings: Readings) -> list[Remark]:
     """A remark with the standard deviation of each channel's discrepancy; none without one."""
-    texts, learned = [], [] if case.remainder is None else case.remainder.columns
+    texts, learned = [], _learned(case)
     for i, name in enumerate(readings.channels):
         own = case.discrepancy.get(column(name), Discrepancy())
         amplitude = own.amplitude(range_with_zero(readings.measured[readings.channel == i]))
@@ -195,16 +195,16 @@ def ignored_discrepancy(
     case: Case, what: str, consequence: str = "its intervals are too narrow"
 ) -> list[Remark]:
     """A remark that `what` ignores [discrepancy]; none for a case without one."""
-    learned = [] if case.remainder is None else case.remainder.columns
-    names = [
-        key
-        for key, one in case.discrepancy.items()
-        if one.amplitude(1.0) > 0.0 and key not in learned
-    ]
+    declared = (key for key, one in case.discrepancy.items() if one.amplitude(1.0) > 0.0)
+    names = [key for key in declared if key not in _learned(case)]
     if not names:
         return []
     text = f"{what} ignores the [discrepancy] of {', '.join(names)}: {consequence}"
     return [Remark("discrepancy-ignored", text, tuple(names))]
+
+
+def _learned(case: Case) -> Sequence[str]:
+    return [] if case.remainder is None else case.remainder.columns
 
 
 def noise_of_operation(

@@ -73,32 +73,23 @@ COARSE = Tolerance(enough=0.5, share=0.01, step_share=0.01, iterations=3, creepi
 
 @dataclass(frozen=True)
 class DampedSteps:
-    """Steps in the coordinates of a fit: their bounds, priors and curvature.
+    """Steps in the coordinates of a fit: their bounds, priors and curvature."""
 
-    lower, upper (p,): Bounds, at which steps end.
-    precision (p,): Precision of each coordinate's normal density about zero, or 0.
-    offset (p,): What is added to a coordinate to obtain a multiple of the parameter, where the
-        parameter moves by ratios; infinite where it moves by differences.
-    terms: Tests of the soil and priors, which stand beside the residuals.
-    """
-
-    lower: Floats
+    lower: Floats  # (p,) bounds, at which steps end
     upper: Floats
-    precision: Floats
+    precision: Floats  # (p,) of each coordinate's normal density about zero, or 0
+    #: (p,) What is added to a coordinate to obtain a multiple of the parameter, where the parameter
+    #: moves by ratios; infinite where it moves by differences
     offset: Floats
+    #: Tests of the soil and priors, which stand beside the residuals
     terms: SoilTestTerms | PriorTerms = field(default_factory=SoilTestTerms)
 
     @staticmethod
     def of(problem: LeastSquaresProblem) -> DampedSteps:
         """The steps of a problem."""
         offset = np.asarray([_offset(c) for c in problem.coordinates])
-        return DampedSteps(
-            lower=problem.lower,
-            upper=problem.upper,
-            precision=problem.precision,
-            offset=offset,
-            terms=problem.terms,
-        )
+        bounds = problem.lower, problem.upper
+        return DampedSteps(*bounds, problem.precision, offset, problem.terms)
 
     def within(self, x: Floats) -> Floats:
         """Coordinates (..., p), moved to the bounds that they are beyond."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,12 @@ from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
-from soilml.fitting.shared_errors import ModelledErrors
+from soilml.fitting.shared_errors import (
+    USUAL_LAW_ERRORS,
+    USUAL_MODEL_ERRORS,
+    ModelledErrors,
+    usual_errors,
+)
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
 
@@ -45,21 +50,14 @@ def error_columns(case: Case, readings: Readings, errors: Mapping[str, float]) -
         growth = np.log(load / np.median(load))
         found["strength_by_load"] = errors["strength_by_load"] * growth * by_strength
         found["law_of_shear"] = errors["law_of_shear"] * by_modulus
-    factors: dict[str, tuple[str, Floats]] = {
-        "torque_gain": ("torque", size),
-        "torque_bias": ("torque", np.ones_like(size)),
-        "torque_by_slip": ("torque", size * slip),
-        "sinkage": ("sinkage", size),
-        "sinkage_bias": ("sinkage", np.ones_like(size)),
-        "sinkage_by_slip": ("sinkage", size * slip),
-        "drawbar_pull": ("drawbar_pull", load),
-        "drawbar_pull_bias": ("drawbar_pull", np.ones_like(size)),
-        "drawbar_pull_by_slip": ("drawbar_pull", load * slip),
-    }
-    for name, (channel, factor) in factors.items():
-        if name in errors and channel in readings.channels:
-            own = readings.channel == readings.channels.index(channel)
-            found[name] = np.where(own, errors[name] * factor, 0.0)
+    gains = {"torque": ("torque_gain", size), "sinkage": ("sinkage", size)}
+    gains["drawbar_pull"] = "drawbar_pull", load
+    for channel, (gain, by) in gains.items():
+        factors = {gain: by, f"{channel}_bias": np.ones_like(size), f"{channel}_by_slip": by * slip}
+        for name, factor in factors.items():
+            if name in errors and channel in readings.channels:
+                own = readings.channel == readings.channels.index(channel)
+                found[name] = np.where(own, errors[name] * factor, 0.0)
     return found
 
 
@@ -86,3 +84,22 @@ def _laws(case: Case, readings: Readings) -> tuple[Floats, Floats]:
 def stacked(columns: Mapping[str, Floats], count: int) -> Floats:
     """Columns (m, k) of m readings as one array."""
     return np.stack(list(columns.values()), axis=1) if columns else np.zeros((count, 0))
+
+
+def shared_columns(
+    case: Case, readings: Readings, soil: Sequence[Coordinate]
+) -> tuple[Floats, tuple[Floats, ...]]:
+    """Columns (m, k) of sensor errors of unit variance, and of errors inside the model (m, q).
+
+    A sensor has the error that the case declares in [bias], else the typical one; the laws of the
+    soil have typical errors, which rows cannot tell from another soil. Errors of bearing, contact
+    and channels are of typical size times one amplitude, which is estimated.
+
+    case: With the soil at which the errors are linearised.
+    soil: Free parameters; what is free is no error.
+    """
+    errors = usual_errors(case, readings.row_load, [c.path for c in soil]) | USUAL_LAW_ERRORS
+    columns, m = error_columns(case, readings, errors), len(readings)
+    of_model = {name: own for name, own in columns.items() if name in USUAL_MODEL_ERRORS}
+    others = {name: own for name, own in columns.items() if name not in of_model}
+    return stacked(others, m), ((stacked(of_model, m),) if of_model else ())

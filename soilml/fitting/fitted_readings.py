@@ -27,34 +27,18 @@ COMPRESSED = 12.0  # Residual in standard deviations from which on the axis is c
 
 @dataclass(frozen=True)
 class FittedReadings:
-    """Readings (m,) of all channels with the predictions of a fitted model.
+    """Readings (m,) of all channels with the predictions of a fitted model."""
 
-    Attributes
-    ----------
-    channels, channel
-        Columns of the channels, and the index (m,) of each reading's.
-    run
-        Run of each reading.
-    slip, load
-        Where it was measured (m,); the load in N.
-    measured, std
-        Readings and standard deviations of their noise (m,), SI units.
-    after, after_std
-        Predictions and their standard deviations by the uncertainty of the fit (m,).
-    before
-        Predictions (m,) without what was added to the model; None where nothing was.
-    """
-
-    channels: tuple[str, ...]
-    channel: NDArray[np.int64]
-    run: tuple[str, ...]
-    slip: Floats
-    load: Floats
-    measured: Floats
+    channels: tuple[str, ...]  # columns
+    channel: NDArray[np.int64]  # index (m,) of each reading's
+    run: tuple[str, ...]  # of each reading
+    slip: Floats  # where it was measured
+    load: Floats  # N
+    measured: Floats  # readings and standard deviations of their noise, SI units
     std: Floats
-    after: Floats
+    after: Floats  # predictions and their standard deviations by the uncertainty of the fit
     after_std: Floats
-    before: Floats | None = None
+    before: Floats | None = None  # predictions without what was added to the model, if anything
 
     @staticmethod
     def of(
@@ -115,17 +99,14 @@ class FittedReadings:
         lines = "Lines: the fitted model."
         if self.before is not None:
             lines = f"Dashed: the soil alone. Solid: {with_added or 'with what was added'}."
-        return Picture(
-            "Measured and predicted",
-            self.plot,
-            2,
-            count,
-            (4.6 * count, 5.4),
-            f"{names} over slip, measured and predicted, with residuals below",
+        alt = f"{names} over slip, measured and predicted, with residuals below"
+        caption = (
             f"Points: readings, coloured by load. {lines} Bands: 90 % of a reading, by its noise "
             "and the uncertainty of the fit. Below: residuals of all readings in standard "
-            "deviations; grey: 90 % of noise.",
+            "deviations; grey: 90 % of noise."
         )
+        size = (4.6 * count, 5.4)
+        return Picture("Measured and predicted", self.plot, 2, count, size, alt, caption)
 
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw the picture into axes (2, channels); see `take_axes`."""
@@ -167,14 +148,9 @@ class FittedReadings:
             yield LOADS[colour], float(np.median(self.load[rows])), rows, line
 
     def _draw_load(
-        self,
-        axes: Any,
-        factor: float,
-        colour: str,
-        load: float,
-        rows: NDArray[Any],
-        line: NDArray[Any],
+        self, axes: Any, factor: float, colour: str, load: float, *parts: NDArray[Any]
     ) -> None:
+        rows, line = parts
         slip, after = self.slip[line], factor * self.after[line]
         band = factor * Z_90 * np.hypot(self.after_std[line], self.std[line])
         if np.unique(slip).size > 1:

@@ -13,14 +13,7 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate, rates_at, values_at
 from soilml.fitting.covariance import Whitening
-from soilml.fitting.predictions import (
-    GearReadings,
-    Linearisation,
-    PredictionRequest,
-    linearise,
-    predict,
-    readings_by_gear,
-)
+from soilml.fitting.predictions import Linearisation, PredictionRequest, linearise, predict
 from soilml.fitting.readings import Readings
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.sinkage_estimate import SinkageEstimate
@@ -99,11 +92,6 @@ class LeastSquaresProblem:
     priors: Literal["", "normal", "all"] = ""
 
     @cached_property
-    def gears(self) -> list[GearReadings]:
-        """The readings of each of several gears."""
-        return readings_by_gear(self.case, self.coordinates, self.readings)
-
-    @cached_property
     def soil_tests(self) -> SoilTestTerms:
         """Deviations from tests of the soil."""
         return SoilTestTerms(self.case, self.coordinates)
@@ -125,8 +113,7 @@ class LeastSquaresProblem:
 
     def request(self, x: Floats, start: SinkageEstimate | None = None) -> PredictionRequest:
         """The predictions at coordinates x (sets, p), searched from an estimate of the sinkage."""
-        readings = self.readings
-        return PredictionRequest(self.case, self.coordinates, x, readings, start, self.gears)
+        return PredictionRequest(self.case, self.coordinates, x, self.readings, start)
 
     def predict(self, x: Floats) -> Floats:
         """Predictions (sets, m) at x (sets, p)."""

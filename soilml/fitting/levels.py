@@ -66,13 +66,10 @@ SLOW = 1e-3
 
 @dataclass(frozen=True)
 class Levels:
-    """The levels of values (n,), ascending.
+    """The levels of values (n,), ascending."""
 
-    `index` (n,) is the level of each value; `low` and `high` (k,) are the ends of each level.
-    """
-
-    index: Integers
-    low: Floats
+    index: Integers  # (n,) level of each value
+    low: Floats  # (k,) ends of each level
     high: Floats
 
     @property
@@ -216,8 +213,7 @@ def replicate_rows(
 
 def _narrow_groups(values: Floats, levels: Levels, width: float) -> Integers:
     """Groups (n,) of values of one level that differ by at most `width` from each other."""
-    group, first, last = np.zeros(len(values), dtype=np.int64), -np.inf, -1
-    number = -1
+    group, first, last, number = np.zeros(len(values), dtype=np.int64), -np.inf, -1, -1
     for i in np.argsort(values, kind="stable"):
         if levels.index[i] != last or values[i] - first > width * (1.0 + 1e-9):
             number, first, last = number + 1, values[i], int(levels.index[i])

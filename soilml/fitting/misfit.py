@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
@@ -37,19 +36,13 @@ INITIAL_NOISE = 0.05
 
 @dataclass(frozen=True)
 class WeightedRows:
-    """Readings whose noise depends on what is expected of them, and the case that is fitted.
-
-    readings: With the standard deviations (m,) that the fit gives them.
-    declared: As they were declared.
-    free: The p free parameters.
-    shared (m, e): Columns of errors that all rows share.
-    """
+    """Readings whose noise depends on what is expected of them, and the case that is fitted."""
 
     case: Case
-    readings: Readings
-    declared: Readings
+    readings: Readings  # with the standard deviations (m,) that the fit gives them
+    declared: Readings  # as they were declared
     free: Sequence[Coordinate]
-    shared: Floats
+    shared: Floats  # (m, e) columns of errors that all rows share
 
     @staticmethod
     def of(case: Case, readings: Readings, free: Sequence[Coordinate]) -> WeightedRows:
@@ -61,14 +54,8 @@ class WeightedRows:
     @cached_property
     def columns(self) -> Floats:
         """Columns (m, q) of the model discrepancy and of errors that all rows share."""
-        process = discrepancy_process(
-            self.readings,
-            self.case.discrepancy,
-            Discrepancy(),
-            LEAST_EIGENVALUE,
-            self.case.remainder,
-        )
-        return np.hstack([process.columns, self.shared])
+        own = self.case.discrepancy, Discrepancy(), LEAST_EIGENVALUE, self.case.remainder
+        return np.hstack([discrepancy_process(self.readings, *own).columns, self.shared])
 
     @cached_property
     def problem(self) -> LeastSquaresProblem:
@@ -100,31 +87,23 @@ def _shared(case: Case, readings: Readings) -> Floats:
 
 def _initial_noise(readings: Readings) -> Floats:
     """A fraction of each channel's RMS reading, (m,)."""
-    return _by_channel(readings, lambda own: INITIAL_NOISE * _rms(readings.measured[own]) + 1e-12)
+    square = _mean_by_channel(readings, readings.measured**2)
+    return np.asarray(INITIAL_NOISE * np.sqrt(square) + 1e-12)
 
 
 def _residual_noise(readings: Readings, residual: Floats, p: int) -> Floats:
     """Noise of each channel (m,) from its residuals, p parameters shared among all readings."""
-
-    def noise(own: NDArray[np.bool_]) -> float:
-        size = int(own.sum())
-        freedom = max(size - p * size / len(readings), 1.0)
-        scatter = float(np.sqrt(residual[own] @ residual[own] / freedom))
-        return max(scatter, 1e-6 * _rms(readings.measured[own]) + 1e-15)
-
-    return _by_channel(readings, noise)
+    size = np.bincount(readings.channel)[readings.channel]
+    freedom = np.maximum(size * (1.0 - p / len(readings)), 1.0)
+    scatter = np.sqrt(_mean_by_channel(readings, residual**2) * size / freedom)
+    least = 1e-6 * np.sqrt(_mean_by_channel(readings, readings.measured**2)) + 1e-15
+    return np.asarray(np.maximum(scatter, least))
 
 
-def _by_channel(readings: Readings, noise: Callable[[NDArray[np.bool_]], float]) -> Floats:
-    std = np.empty(len(readings))
-    for i in range(len(readings.channels)):
-        own = readings.channel == i
-        std[own] = noise(own)
-    return std
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+def _mean_by_channel(readings: Readings, values: Floats) -> Floats:
+    """Mean of values (m,) over the channel of each reading, (m,)."""
+    counts = np.maximum(np.bincount(readings.channel), 1)
+    return np.asarray((np.bincount(readings.channel, values) / counts)[readings.channel])
 
 
 Z_999 = 3.09  # Normal quantile of 0.999

@@ -41,18 +41,14 @@ DIFFERENCE_STEP = 1e-6
 
 @dataclass(frozen=True)
 class GearReadings:
-    """The readings of one gear, with its case and the coordinates that act on it.
-
-    `kept` (p,) are the positions of these coordinates among all, `rows` (n,) those of the rows and
-    `selected` (m,) those of the readings.
-    """
+    """The readings of one gear, with its case and the coordinates that act on it."""
 
     case: Case
     coordinates: list[Coordinate]
-    kept: Integers
+    kept: Integers  # (p,) positions of these coordinates among all
     readings: Readings
-    rows: Integers
-    selected: Integers
+    rows: Integers  # (n,) positions of the rows
+    selected: Integers  # (m,) positions of the readings
 
 
 def readings_by_gear(
@@ -63,23 +59,13 @@ def readings_by_gear(
     A gear without readings is left out.
     """
     parts: list[GearReadings] = []
-    if not case.gears:
-        return parts
-    for gear in rows_by_gear(case, readings.at):
+    for gear in rows_by_gear(case, readings.at) if case.gears else ():
         selected, own = readings.of_rows(gear.rows, gear.at)
-        if not selected.any():
-            continue
-        kept = [i for i, c in enumerate(coordinates) if c.path in gear.paths]
-        parts.append(
-            GearReadings(
-                gear.case,
-                [replace(coordinates[i], path=gear.paths[coordinates[i].path]) for i in kept],
-                np.asarray(kept, dtype=np.int64),
-                own,
-                gear.rows,
-                np.flatnonzero(selected),
-            )
-        )
+        if selected.any():
+            kept = [i for i, c in enumerate(coordinates) if c.path in gear.paths]
+            free = [replace(coordinates[i], path=gear.paths[coordinates[i].path]) for i in kept]
+            at, chosen = np.asarray(kept, dtype=np.int64), np.flatnonzero(selected)
+            parts.append(GearReadings(gear.case, free, at, own, gear.rows, chosen))
     return parts
 
 
@@ -88,8 +74,7 @@ class PredictionRequest:
     """The readings that a case predicts at sets of coordinates, x (sets, p).
 
     `estimate`, (sets, n) for the n operating points, is where the searches for equilibrium start;
-    see `soilml.physics.sinkage_estimate.SinkageEstimate`. `gears` are the readings of each of
-    several gears, where they are known from an earlier request.
+    see `soilml.physics.sinkage_estimate.SinkageEstimate`.
     """
 
     case: Case
@@ -97,7 +82,6 @@ class PredictionRequest:
     x: Floats
     readings: Readings
     estimate: SinkageEstimate | None = None
-    gears: Sequence[GearReadings] | None = None
 
     def of_gear(self, part: GearReadings) -> PredictionRequest:
         """The same for the readings of one of several gears."""
@@ -221,10 +205,7 @@ def _by_gear(
     join: Callable[[PredictionRequest, Sequence[GearReadings], Sequence[T]], T],
 ) -> list[T | InputError]:
     """Answers to all requests; one of several gears is asked for each gear, and joined again."""
-    parts = [
-        readings_by_gear(r.case, r.coordinates, r.readings) if r.gears is None else r.gears
-        for r in requests
-    ]
+    parts = [readings_by_gear(r.case, r.coordinates, r.readings) for r in requests]
     asked: list[PredictionRequest] = []
     for request, own in zip(requests, parts, strict=True):
         asked += [request.of_gear(part) for part in own] if request.case.gears else [request]
@@ -235,9 +216,9 @@ def _by_gear(
             answers.append(next(found))
             continue
         each = [next(found) for _ in own]
-        refused = [one for one in each if isinstance(one, InputError)]
         known = [one for one in each if not isinstance(one, InputError)]
-        answers.append(refused[0] if refused else join(request, own, known))
+        refused = (one for one in each if isinstance(one, InputError))
+        answers.append(next(refused, None) or join(request, own, known))
     return answers
 
 
@@ -287,10 +268,11 @@ def _answered(
         try:
             found = answer([requests[i] for i in group])
             answers |= dict(zip(group, found, strict=True))
-        except (InputError, CycleError):
-            for i in group:
-                alone = _answer_one(requests[i], answer)
-                answers[i] = alone
+        except (InputError, CycleError) as error:
+            if len(group) > 1:
+                answers |= {i: _answered([requests[i]], answer)[0] for i in group}
+            else:
+                answers[group[0]] = error if isinstance(error, InputError) else InputError(error)
     return [answers[i] for i in range(len(requests))]
 
 
@@ -389,12 +371,3 @@ def remainder_at(case: Case, readings: Readings) -> Floats:
             at = readings.slip[own], readings.load[own]
             mean[own] = case.remainder.mean_and_std(name, *at)[0]
     return mean
-
-
-def _answer_one(
-    request: PredictionRequest, answer: Callable[[Sequence[PredictionRequest]], list[T]]
-) -> T | InputError:
-    try:
-        return answer([request])[0]
-    except InputError as error:
-        return error

@@ -33,75 +33,41 @@ LEAST_OF_MEDIAN = 1e-3
 
 @dataclass(frozen=True)
 class CondensedRows:
-    """What condensed rows stand for.
+    """What condensed rows stand for."""
 
-    rows, readings: Numbers of measured rows, and of their readings.
-    squares: Sum of the squared distances of the readings from those of their condensed rows, in
-        standard deviations of their noise.
-    undeclared: Columns whose noise is that of their residuals, since none is declared.
-    """
-
-    rows: int
+    rows: int  # numbers of measured rows, and of their readings
     readings: int
+    #: Sum of the squared distances of the readings from those of their condensed rows, in standard
+    #: deviations of their noise
     squares: float
-    undeclared: tuple[str, ...] = ()
+    undeclared: tuple[str, ...] = ()  # columns whose noise is that of their residuals
 
 
 @dataclass(frozen=True)
 class Readings:
-    """Operating points of n rows, and the m readings of all channels in one vector.
+    """Operating points of n rows, and the m readings of all channels in one vector."""
 
-    Attributes
-    ----------
-    at
-        Operating points, arrays (n,).
-    run, runs, order
-        Index (n,) of each row's run in `runs`; position (n,) of the row in its run,
-        by time.
-    channels
-        Names of the channels.
-    row, channel
-        Row, and index in `channels`, of each reading, (m,).
-    measured, std
-        Measured values (m,), of planned rows the expected ones, and their noise: as
-        declared, NaN where it is not; in a fit, as it is taken.
-    noise, from_case
-        Noise of each channel that the case declares, and of which readings (m,) it is
-        the noise; that of others stands in the table.
-    slip_std, load_std
-        Declared noise of slip and of load (N), (n,); 0 where none is declared.
-    sensor_std
-        The part (m,) of `std` that is not noise of slip and load, where these were added.
-    excluded_channels
-        Columns that are not fitted, since their noise is not declared and that of
-        others is.
-    notes
-        Remarks on the table.
-    shared_errors
-        Standard deviations of the errors that all rows share, by name: as [bias]
-        declares them, or with those that sensors and models typically have.
-    condensed
-        What the rows stand for, where many were condensed.
-    """
-
-    at: Operating
-    run: Integers
+    at: Operating  # arrays (n,)
+    run: Integers  # (n,) index of each row's run in `runs`
     runs: tuple[str, ...]
-    order: Integers
-    channels: tuple[str, ...]
-    row: Integers
-    channel: Integers
-    measured: Floats
-    std: Floats
-    noise: tuple[Noise | None, ...]
-    from_case: Booleans
-    slip_std: Floats
-    load_std: Floats
-    sensor_std: Floats | None = None
+    order: Integers  # (n,) position of each row in its run, by time
+    channels: tuple[str, ...]  # names
+    row: Integers  # (m,) row of each reading
+    channel: Integers  # (m,) its index in `channels`
+    measured: Floats  # (m,) measured values, of planned rows the expected ones
+    std: Floats  # (m,) their noise: as declared, NaN where it is not; in a fit, as it is taken
+    noise: tuple[Noise | None, ...]  # of each channel, as the case declares it
+    from_case: Booleans  # (m,) whether that is the noise of a reading; else it is in the table
+    slip_std: Floats  # (n,) declared noise; 0 where none is declared
+    load_std: Floats  # (n,) likewise, N
+    sensor_std: Floats | None = None  # (m,) `std` without noise of slip and load, if these are in
+    #: Columns that are not fitted, since their noise is not declared and that of others is
     excluded_channels: tuple[str, ...] = ()
-    notes: tuple[Remark, ...] = ()
+    notes: tuple[Remark, ...] = ()  # on the table
+    #: Standard deviations of the errors that all rows share, by name: as [bias] declares them, or
+    #: with those that sensors and models typically have
     shared_errors: Mapping[str, float] = field(default_factory=dict)
-    condensed: CondensedRows | None = None
+    condensed: CondensedRows | None = None  # what the rows stand for, where many were condensed
 
     @staticmethod
     def of_every_row(
@@ -251,17 +217,16 @@ class Readings:
         )
 
     @cached_property
-    def _by_channel(self) -> list[tuple[Integers, Integers]]:
-        """Positions of the readings of each channel, and their rows."""
-        found = [np.flatnonzero(self.channel == i) for i in range(len(self.channels))]
-        return [(own, self.row[own]) for own in found]
+    def _by_channel(self) -> list[Integers]:
+        """Positions of the readings of each channel."""
+        return [np.flatnonzero(self.channel == i) for i in range(len(self.channels))]
 
     def stack(self, force: Mapping[str, Floats]) -> Floats:
         """Values of each channel by row, (..., n), as one vector, (..., m)."""
         first = force[self.channels[0]] if self.channels else np.zeros(0)
         stacked = np.empty((*first.shape[:-1], len(self)))
-        for name, (own, rows) in zip(self.channels, self._by_channel, strict=True):
-            stacked[..., own] = force[name][..., rows]
+        for name, own in zip(self.channels, self._by_channel, strict=True):
+            stacked[..., own] = force[name][..., self.row[own]]
         return stacked
 
     def noise_at(self, expected: Floats) -> Floats:
@@ -272,22 +237,21 @@ class Readings:
         value. A standard deviation is at least a thousandth of its channel's median.
         """
         own = self.std if self.sensor_std is None else self.sensor_std
-        if not any(noise is not None and noise.share > 0.0 for noise in self.noise):
-            std = np.broadcast_to(own, expected.shape)
-        else:
-            std = np.tile(own, (*expected.shape[:-1], 1))
-            for i, noise in enumerate(self.noise):
-                if noise is not None and noise.share > 0.0:
-                    kept = np.flatnonzero(self.from_case & (self.channel == i))
-                    there = noise.std(expected[..., kept])
-                    std[..., kept] = np.where(there >= 0.0, there, std[..., kept])
+        shares = [i for i, n in enumerate(self.noise) if n is not None and n.share > 0.0]
+        std = np.broadcast_to(own, expected.shape)
+        std = std.copy() if shares else std
+        for i in shares:
+            kept, noise = np.flatnonzero(self.from_case & (self.channel == i)), self.noise[i]
+            assert noise is not None
+            there = noise.std(expected[..., kept])
+            std[..., kept] = np.where(there >= 0.0, there, std[..., kept])
         return np.asarray(np.fmax(std, self._least_std))
 
     @cached_property
     def _least_std(self) -> Floats:
         own = self.std if self.sensor_std is None else self.sensor_std
         least = np.zeros(len(self))
-        for positions, _ in self._by_channel:
+        for positions in self._by_channel:
             if np.isfinite(own[positions]).all() and positions.size:
                 least[positions] = LEAST_OF_MEDIAN * np.median(own[positions])
         return np.where(np.isfinite(own), least, np.nan)
@@ -302,18 +266,16 @@ class Readings:
 
     def with_known_noise(self) -> tuple[Readings, list[Remark]]:
         """The channels with known noise, if there are any, and notes about the excluded ones."""
-        unknown = {int(i) for i in self.channel[~np.isfinite(self.std)]}
-        if not unknown or len(unknown) == len(self.channels):
+        unknown = self.undeclared
+        kept = [i for i, name in enumerate(self.channels) if column(name) not in unknown]
+        if not unknown or not kept:
             return self, []
-        notes = []
-        for i in sorted(unknown):
-            key = column(self.channels[i])
-            text = (
-                f"{key} is excluded: its noise is not declared and there are no repeated rows to "
-                f"estimate it from; declare it in [noise], such as {key} = '3 %'"
-            )
-            notes.append(Remark("unused-channel", text, (key,)))
-        return self.of_channels([i for i in range(len(self.channels)) if i not in unknown]), notes
+        text = (
+            "{0} is excluded: its noise is not declared and there are no repeated rows to "
+            "estimate it from; declare it in [noise], such as {0} = '3 %'"
+        )
+        notes = [Remark("unused-channel", text.format(key), (key,)) for key in unknown]
+        return self.of_channels(kept), notes
 
     def with_default_std(self, std: Mapping[str, float]) -> Readings:
         """The readings with these standard deviations, by channel, where none is declared."""
@@ -335,31 +297,26 @@ def stack_readings(case: Case, table: Table) -> Readings:
     for r in range(len(runs)):
         rows = np.flatnonzero(number == r)
         order[rows[np.argsort(time[rows], kind="stable")]] = np.arange(rows.size)
-    parts: dict[str, list[Any]] = {
-        name: [np.zeros(0)] for name in ("row", "channel", "measured", "std", "from_case")
-    }
+    found: list[tuple[NDArray[Any], ...]] = [(np.zeros(0),) * 5]
     for i, name in enumerate(names):
         key = column(name)
         kept = np.flatnonzero(np.isfinite(table[key]))
         own = table[f"{key}_std"] if f"{key}_std" in table else np.full(len(table), np.nan)
-        parts["row"].append(kept)
-        parts["channel"].append(np.full(kept.size, i))
-        parts["measured"].append(table[key][kept])
-        parts["std"].append(positive_std(case, table, key)[kept])
-        parts["from_case"].append(~np.isfinite(own[kept]))
-    joined = {name: np.concatenate(own) for name, own in parts.items()}
+        std, from_case = positive_std(case, table, key)[kept], ~np.isfinite(own[kept])
+        found.append((kept, np.full(kept.size, i), table[key][kept], std, from_case))
+    row, channel, measured, std, from_case = map(np.concatenate, zip(*found, strict=True))
     return Readings(
         at=operating_points(table),
         run=number.astype(np.int64),
         runs=tuple(str(name) for name in runs),
         order=order,
         channels=names,
-        row=joined["row"].astype(np.int64),
-        channel=joined["channel"].astype(np.int64),
-        measured=joined["measured"],
-        std=joined["std"],
+        row=row.astype(np.int64),
+        channel=channel.astype(np.int64),
+        measured=measured,
+        std=std,
         noise=tuple(case.noise.get(column(name)) for name in names),
-        from_case=joined["from_case"].astype(bool),
+        from_case=from_case.astype(bool),
         slip_std=np.nan_to_num(positive_std(case, table, "slip")),
         load_std=np.nan_to_num(positive_std(case, table, "load_N")),
         shared_errors=declared_errors(case),

@@ -14,7 +14,7 @@ from soilml.config.case import Case
 from soilml.config.measurement_noise import EFFECT_OF_ERROR, KNOWN_PARTS, common_errors
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import Effect, EffectCard
-from soilml.physics.effects.exit_angle import ExitAngle
+from soilml.physics.effects.contact_shape import ExitAngle
 from soilml.physics.gears.base import Gear
 from soilml.physics.gears.emulated import EmulatedGear
 from soilml.physics.gears.rigid_wheel import WheelArc, entry_angle

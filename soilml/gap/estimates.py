@@ -12,7 +12,6 @@ from soilml.config.measurement_noise import Discrepancy, unestimated_bias
 from soilml.config.remainder import Remainder
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.effect_signatures import effect_signatures
-from soilml.fitting.fitted_readings import FittedReadings
 from soilml.fitting.least_squares import Solution
 from soilml.gap.decision import Decision
 from soilml.gap.remainder import discrepancy_amplitudes, learned_remainder
@@ -172,26 +171,6 @@ def variance_component_entries(posterior: Posterior) -> dict[str, float]:
         "bearing_std": float(bearing * SCATTER_UNITS["bearing"]),
         "autocorrelation": at.autocorrelation,
     }
-
-
-def readings_and_predictions(
-    posterior: Posterior, before: Solution, after: Solution
-) -> FittedReadings:
-    """Readings, predictions by the soil alone and by the fit shown, and standard deviations."""
-    readings, jacobian = posterior.terms.readings, after.derivatives
-    variance = np.einsum("ij,jk,ik->i", jacobian, after.covariance, jacobian)
-    return FittedReadings(
-        channels=tuple(column(n) for n in readings.channels),
-        channel=readings.channel,
-        run=tuple(readings.runs[readings.run[r]] for r in readings.row),
-        slip=readings.slip,
-        load=readings.load,
-        measured=readings.measured,
-        std=posterior.std,
-        before=before.prediction,
-        after=after.prediction,
-        after_std=np.sqrt(np.maximum(variance, 0.0)),
-    )
 
 
 def signature_similarity(posterior: Posterior, node: Explanation) -> SignatureSimilarity:

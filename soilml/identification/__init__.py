@@ -199,4 +199,4 @@ def _about_soil_tests(case: Case, fit: Fit) -> list[Remark]:
     ]
 
 
-__all__ = ["METHODS", "Coordinate", "Fit", "Readings", "identify"]
+__all__ = ["METHODS", "Fit", "identify"]

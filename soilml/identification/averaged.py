@@ -12,6 +12,7 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.candidate_effects import candidate_effects
 from soilml.fitting.coordinates import Coordinate, values_at
+from soilml.fitting.error_columns import shared_columns
 from soilml.fitting.global_optimum import raise_uncarried
 from soilml.fitting.misfit import Misfit, fit_under_declared_noise, misfit_limit
 from soilml.fitting.readings import Readings
@@ -27,7 +28,6 @@ from soilml.inference import constants
 from soilml.inference.draws import Draws
 from soilml.inference.posterior import Posterior, infer
 from soilml.inference.problem import InferenceProblem
-from soilml.inference.shared_columns import shared_columns
 from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.physics.effects import EFFECTS
 from soilml.physics.effects.base import Effect
@@ -114,9 +114,11 @@ def averaged_samples(
         raise_uncarried(case, readings.at)
     fixed, inner = shared_columns(found.soil.fit.fitted(), found.terms.readings, free)
     found = found.beside(fixed, inner)
-    parts = [_fractions(own, free) for own in found.draws(0)]
-    u, weights = np.concatenate([u for u, _ in parts]), _normalised([w for _, w in parts])
-    sample = ImportanceSample(u, weights, 0.0)
+    u, weights = map(
+        np.concatenate, zip(*(_fractions(d, free) for d in found.draws(0)), strict=True)
+    )
+    weights = weights if weights.sum() > 0.0 else np.ones_like(weights)
+    sample = ImportanceSample(u, weights / weights.sum(), 0.0)
     return AveragedSamples(sample, misfit, 1.0, _explanations(found))
 
 
@@ -147,13 +149,6 @@ def _fractions(own: Draws, free: Sequence[Coordinate]) -> tuple[Floats, Floats]:
     )
     inside = ((u > 0.0) & (u < 1.0)).all(axis=1)
     return u, own.weight * inside
-
-
-def _normalised(weights: Sequence[Floats]) -> Floats:
-    joined = np.concatenate(weights)
-    if not joined.sum() > 0.0:
-        joined = np.ones_like(joined)
-    return np.asarray(joined / joined.sum())
 
 
 def _explanations(found: Posterior) -> tuple[SoilExplanation, ...]:

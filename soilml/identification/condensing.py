@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from heapq import heapify, heappop, heappush
+from heapq import heappop, heappush
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
@@ -53,7 +52,10 @@ def condensed(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Rea
     count = len(readings.row_slip)
     if count <= MOST_ROWS:
         return readings
-    readings = replace(readings, at=_without_unused_order(case, readings.at))
+    models = (case.model, *case.gears.values())
+    used = {field for model in models for effect in model.effects for field in effect.about.uses}
+    unknown: dict[str, Any] = dict.fromkeys(FROM_ORDER.keys() - used)
+    readings = replace(readings, at=replace(readings.at, **unknown))
     part = np.random.default_rng(0).permutation(count)[:FIRST_ROWS]
     fewer = readings.of_rows(np.sort(part))[1]
     cell: Integers | None = None
@@ -68,32 +70,26 @@ def condensed(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Rea
     return fewer
 
 
-def _without_unused_order(case: Case, at: Operating) -> Operating:
-    """The operating points without what follows from the order of rows and no effect uses."""
-    models = (case.model, *case.gears.values())
-    used = {field for model in models for effect in model.effects for field in effect.about.uses}
-    unknown: dict[str, Any] = dict.fromkeys(FROM_ORDER.keys() - used)
-    return replace(at, **unknown)
-
-
 def _condensed_at(
     known: Case, readings: Readings, residual: Floats, std: Floats, cell: Integers
 ) -> Readings:
     """The condensed rows of cells (n,), with the differences that a known case has within them."""
     n, has = len(readings.row_slip), np.isfinite(residual)
-    solved = np.zeros(n, bool)
-    solved[readings.row[has]] = True
-    has_reading = np.zeros(n, bool)
-    has_reading[readings.row] = True
-    unsolved = np.flatnonzero(has_reading & ~solved)
+    solved = np.isin(np.arange(n), readings.row[has])
+    unsolved = np.setdiff1d(readings.row, readings.row[has])
     kept = unsolved[:: len(unsolved) // MOST_UNSOLVED + 1]
     number = np.full(n, -1)
     number[solved] = np.unique(cell[solved], return_inverse=True)[1]
-    cells = int(number.max()) + 1
-    first = np.zeros(cells, np.int64)
-    first[number[solved][::-1]] = np.flatnonzero(solved)[::-1]
-    means = _means(readings.at, solved, number[solved], first)
-    at = _joined(means, operating_points_of_rows(readings.at, kept))
+    cells, names = int(number.max()) + 1, ("slip", "load", "gear", *COVARIATES)
+    first = np.unique(number[solved], return_index=True)[1]
+    size = np.bincount(number[solved], minlength=cells)
+    columns: dict[str, Any] = {}
+    for name in names:
+        if np.ndim(value := getattr(readings.at, name)):
+            own = np.asarray(value)[solved]
+            mean = own[first] if name == "gear" else np.bincount(number[solved], own) / size
+            columns[name] = np.append(mean, np.asarray(value)[kept])
+    at = replace(readings.at, **columns)
     middle = forces(known, operating_points_of_rows(at, np.arange(cells)))
     position = np.full(n, -1)
     position[kept] = cells + np.arange(len(kept))
@@ -138,8 +134,9 @@ def _residuals(known: Case, readings: Readings) -> tuple[Floats, Floats]:
     Noise that is not declared is that of the residuals.
     """
     residual, std = np.full(len(readings), np.nan), np.full(len(readings), np.nan)
-    for block in _blocks(len(readings.row_slip)):
-        selected, part = readings.of_rows(block)
+    count = len(readings.row_slip)
+    for start in range(0, count, BLOCK):
+        selected, part = readings.of_rows(np.arange(start, min(start + BLOCK, count)))
         prediction = predict(known, [], np.zeros((1, 0)), part)[0]
         residual[selected] = part.measured - prediction
         std[selected] = np.hypot(part.noise_at(prediction), noise_of_operation(known, part))
@@ -148,11 +145,6 @@ def _residuals(known: Case, readings: Readings) -> tuple[Floats, Floats]:
         estimated = max(float(np.sqrt(np.nanmean(residual[own] ** 2))), 1e-15)
         std[own & ~np.isfinite(std)] = estimated
     return residual, std
-
-
-def _blocks(count: int) -> Iterator[Integers]:
-    for start in range(0, count, BLOCK):
-        yield np.arange(start, min(start + BLOCK, count))
 
 
 def _coordinates(readings: Readings, std: Floats) -> Floats:
@@ -181,30 +173,6 @@ def _groups(at: Operating) -> Integers:
     return np.asarray((gear_numbers(at) * (passes.max() + 1) + passes) * 2 + (slip < 0.0))
 
 
-def _means(
-    at: Operating, solved: NDArray[np.bool_], number: Integers, first: Integers
-) -> Operating:
-    """Mean operating points (cells,) of the solved rows by the number of their cell."""
-    count = np.bincount(number, minlength=len(first))
-    means = {
-        name: np.bincount(number, np.asarray(value)[solved], len(first)) / count
-        for name in ("slip", "load", *COVARIATES)
-        if np.ndim(value := getattr(at, name))
-    }
-    gear = None if at.gear is None else np.asarray(at.gear)[first]
-    return replace(at, gear=gear, **means)
-
-
-def _joined(at: Operating, more: Operating) -> Operating:
-    """The operating points of both."""
-    arrays = {
-        name: np.append(value, getattr(more, name))
-        for name in ("slip", "load", "gear", *COVARIATES)
-        if np.ndim(value := getattr(at, name))
-    }
-    return replace(at, **arrays)
-
-
 def cells_of(points: Floats, groups: Integers, most: int) -> Integers:
     """Number of the cell of each of n rows, (n,).
 
@@ -219,13 +187,14 @@ def cells_of(points: Floats, groups: Integers, most: int) -> Integers:
     done: list[Integers] = []
 
     def put(rows: Integers) -> None:
-        scatter, widest = _scatter(points, rows)
-        if scatter > 0.0:
-            heappush(waiting, (-scatter, int(rows[0]), widest, rows))
+        own = points[rows]
+        sums = ((own - own.mean(axis=0)) ** 2).sum(axis=0)
+        widest = int(np.argmax(sums))
+        if sums[widest] > 0.0:
+            heappush(waiting, (-float(sums[widest]), int(rows[0]), widest, rows))
         else:
             done.append(rows)
 
-    heapify(waiting)
     for group in np.unique(groups):
         put(np.flatnonzero(groups == group))
     while waiting and len(waiting) + len(done) < most:
@@ -241,11 +210,3 @@ def cells_of(points: Floats, groups: Integers, most: int) -> Integers:
     for number, rows in enumerate([*done, *(entry[3] for entry in waiting)]):
         cell[rows] = number
     return cell
-
-
-def _scatter(points: Floats, rows: Integers) -> tuple[float, int]:
-    """Largest sum of squared distances from the mean of a coordinate, and this coordinate."""
-    own = points[rows]
-    sums = ((own - own.mean(axis=0)) ** 2).sum(axis=0)
-    widest = int(np.argmax(sums))
-    return float(sums[widest]), widest

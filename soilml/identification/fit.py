@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,6 @@ from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.levels import is_one_load
 from soilml.fitting.misfit import excess_residuals_remark
 from soilml.fitting.readings import Readings
-from soilml.identification.soil_explanation import SoilExplanation as SoilExplanation
 from soilml.parameters import unit_text
 from soilml.physics.soils.soil_tests import deviations
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE, Z_90
@@ -41,6 +41,46 @@ BOUND_TOLERANCE = 1e-3
 WIDENED = "std is multiplied by this factor"
 #: Codes of the remarks by which rows speak against the model taken as exact.
 AGAINST_EXACT = ("excess-residuals", "unlikely")
+
+
+@dataclass(frozen=True)
+class SoilExplanation:
+    """One way in which sensors and model may differ from the model file.
+
+    Attributes
+    ----------
+    effects
+        Names of effects of the catalogue that the model lacks; none for the soil alone.
+    discrepancy
+        Whether there is a smooth error of the model beside them.
+    probability
+        Its share in the averaged answer.
+    """
+
+    effects: tuple[str, ...]
+    discrepancy: bool
+    probability: float
+
+    @property
+    def exact(self) -> bool:
+        """Whether it takes the model, but for its sensors, to be as in the file."""
+        return not self.effects and not self.discrepancy
+
+    def __str__(self) -> str:
+        """What it says, in words."""
+        if self.exact:
+            return "typical errors of the sensors alone"
+        errors = ("a smooth error of the model",) if self.discrepancy else ()
+        return " and ".join((*self.effects, *errors))
+
+    def as_json(self) -> dict[str, Any]:
+        """Its content in a report."""
+        return {
+            "effects": list(self.effects),
+            "discrepancy": self.discrepancy,
+            "probability": self.probability,
+            "text": str(self),
+        }
 
 
 @dataclass(frozen=True, repr=False)
@@ -298,16 +338,12 @@ def identifiability_remarks(name: str, fraction: float, one_load: bool = False) 
 def trade_offs(fit: Fit) -> list[Remark]:
     """That two parameters compensate each other."""
     correlation = fit.correlation
+    text = "{} and {} trade off (correlation {:+.2f}): a combination of the two is identified "
+    text += "better than either"
     return [
-        Remark(
-            "trade-off",
-            f"{a} and {b} trade off (correlation {correlation[i, j]:+.2f}): a combination of the "
-            "two is identified better than either",
-            (a, b),
-        )
-        for i, a in enumerate(fit.names)
-        for j, b in enumerate(fit.names)
-        if i < j and abs(correlation[i, j]) > STRONG_CORRELATION
+        Remark("trade-off", text.format(a, b, correlation[i, j]), (a, b))
+        for (i, a), (j, b) in combinations(enumerate(fit.names), 2)
+        if abs(correlation[i, j]) > STRONG_CORRELATION
     ]
 
 
@@ -316,8 +352,8 @@ def disagreeing_soil_tests(case: Case, values: Mapping[str, float]) -> list[str]
     at = np.asarray(list(values.values()))
     each = deviations(case.soil_tests, case.soil, list(values), at)
     return [
-        f"{test.label()} was {_kpa(test.measured)} kPa in the test, and is "
-        f"{_kpa(test.measured * np.exp(z * test.scatter))} kPa by the fitted soil "
+        f"{test.label()} was {1e-3 * test.measured:.3g} kPa in the test, and is "
+        f"{1e-3 * test.measured * np.exp(z * test.scatter):.3g} kPa by the fitted soil "
         f"({abs(z):.1f} standard deviations)"
         for test, z in zip(case.soil_tests, each, strict=True)
         if abs(z) > NOTABLE
@@ -330,7 +366,3 @@ def ignored_soil_tests(case: Case) -> list[Remark]:
         return []
     text = "[[soil.test]] is ignored: a file for the board takes no tests of the soil"
     return [Remark("soil-tests-ignored", text)]
-
-
-def _kpa(stress: float) -> str:
-    return f"{1e-3 * stress:.3g}"

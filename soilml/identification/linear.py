@@ -122,14 +122,8 @@ def _usable_rows(case: Case, readings: Readings) -> _Rows:
             f"{int(usable.sum())} rows with driving slip, torque and sinkage: the linear method "
             "needs two at different loads or slips"
         )
-    return _Rows(
-        slip=slip[usable],
-        load=readings.row_load[usable],
-        torque=torque[usable],
-        sinkage=sinkage[usable],
-        torque_std=torque_std[usable],
-        sinkage_std=sinkage_std[usable],
-    )
+    columns = slip, readings.row_load, torque, sinkage, torque_std, sinkage_std
+    return _Rows(*(values[usable] for values in columns))
 
 
 def _iterate(case: Case, rows: _Rows) -> tuple[Floats, Floats, Floats, Floats]:
@@ -224,20 +218,19 @@ def with_fixed_parameter(case: Case, path: str, solve: Callable[[Case], Fit]) ->
     """
     fit = solve(case)
     prior = case.prior.get(path)
-    value = float(case.parameters()[path][1])
-    if prior is None:
-        text = f"{path} is fixed at {value:g} and treated as exact: it has no prior"
-        note = Remark("fixed-parameter", text, (path,))
-        return replace(fit, warnings=(note, *fit.warnings, *_validity(fit, case)))
     covariance = fit.covariance.copy()
-    for side in SIDES:
+    known = " and treated as exact: it has no prior"
+    if prior is not None:
+        known = "; the width of its prior is propagated into std"
+    text = f"{path} is fixed at {float(case.parameters()[path][1]):g}{known}"
+    for side in SIDES if prior is not None else ():
+        assert prior is not None
         moved = float(prior.at(np.asarray([side]))[0])
         try:
             change = solve(case.with_values({path: moved})).values - fit.values
         except FitError:
             continue
         covariance += 0.5 * np.outer(change, change)
-    text = f"{path} is fixed at {value:g}; the width of its prior is propagated into std"
     note = Remark("fixed-parameter", text, (path,))
     warnings = (note, *fit.warnings, *_validity(fit, case))
     return replace(fit, covariance=covariance, warnings=warnings)

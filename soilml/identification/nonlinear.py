@@ -7,12 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate, rates_at, values_at
 from soilml.fitting.damped_descents import EXACT, descend
-from soilml.fitting.least_squares import Solution
 from soilml.fitting.misfit import Misfit, fit_under_declared_noise
 from soilml.fitting.readings import Readings
 from soilml.identification.fit import WIDENED, Fit, at_prior_bound, with_warnings
@@ -74,34 +72,25 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
     if np.any(at_prior_bound(optimum.x)):
         problem = replace(weighted.problem, priors="all")
         with_prior = descend(problem, optimum.x, EXACT, optimum.linearisation)
-    return _fit(case, free, readings, optimum, with_prior, undeclared=undeclared)
-
-
-def _fit(
-    case: Case,
-    free: Sequence[Coordinate],
-    readings: Readings,
-    optimum: Solution,
-    with_prior: Solution,
-    *,
-    undeclared: bool,
-) -> Fit:
-    """The result at an optimum; `with_prior` is the one that a Gaussian prior is included in."""
     x = optimum.x
     found = Misfit.of(optimum, readings, len(free))
     excess = not undeclared and found.exceeds_noise
     of_prior = np.asarray([c.fraction_precision for c in free])
-    precision = np.diag(of_prior)
-    for_tests = optimum.soil_tests.rates(x)
-    precision += for_tests.T @ for_tests
-    noise_variance = found.per_freedom if excess else 1.0
-    covariance, linear_std = _covariance(
-        optimum,
-        with_prior,
-        noise_variance,
-        precision,
-        np.where(np.isinf(optimum.problem.normal_std), of_prior, 0.0),
+    of_tests = optimum.soil_tests.rates(x)
+    precision = np.diag(of_prior) + of_tests.T @ of_tests
+    noise = found.per_freedom if excess else 1.0
+    linearised, along_valley = (
+        np.linalg.inv(at.jacobian.T @ at.jacobian / noise + precision)  # Gauss-Newton
+        for at in (optimum, with_prior)
     )
+    linear_std = np.sqrt(np.diag(linearised))
+    uniform = np.where(np.isinf(optimum.problem.normal_std), of_prior, 0.0)
+    to_posterior_mean = linearised @ (uniform * (0.5 - x))
+    total = np.maximum(
+        np.hypot(linear_std, to_posterior_mean),
+        np.hypot(np.sqrt(np.diag(along_valley)), with_prior.x - x),
+    )
+    covariance = linearised * np.outer(total / linear_std, total / linear_std)
     values, rate = values_at(free, x), rates_at(free, x)
     fit = Fit(
         method="nonlinear",
@@ -127,27 +116,3 @@ def _fit(
         excess_residuals=WIDENED if excess else "",
         undeclared=undeclared,
     )
-
-
-def _covariance(
-    optimum: Solution,
-    with_prior: Solution,
-    noise_variance: float,
-    precision: Floats,
-    uniform_precision: Floats,
-) -> tuple[Floats, Floats]:
-    """Covariance (p, p) of the error of `optimum.x`, and the std (p,) of the linearised problem."""
-    linearised = _posterior_covariance(optimum, noise_variance, precision)
-    std = np.sqrt(np.diag(linearised))
-    to_posterior_mean = linearised @ (uniform_precision * (0.5 - optimum.x))
-    along_valley = np.sqrt(np.diag(_posterior_covariance(with_prior, noise_variance, precision)))
-    total = np.maximum(
-        np.hypot(std, to_posterior_mean), np.hypot(along_valley, with_prior.x - optimum.x)
-    )
-    return linearised * np.outer(total / std, total / std), std
-
-
-def _posterior_covariance(at: Solution, noise_variance: float, precision: Floats) -> Floats:
-    """Inverse of the Gauss-Newton Hessian, with the precision (p, p) of priors and soil tests."""
-    information = at.jacobian.T @ at.jacobian / noise_variance
-    return np.asarray(np.linalg.inv(information + precision))

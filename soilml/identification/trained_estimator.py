@@ -63,25 +63,23 @@ def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list
     gear, soil, prior = case.model.gear, case.soil, case.prior
     if not isinstance(gear, Wheel):
         raise InputError(f"{estimator.path} is for rigid wheels, not for a {gear.name}")
-    if case.model.effects:
-        names = ", ".join(effect.name for effect in case.model.effects)
+    names = ", ".join(effect.name for effect in case.model.effects)
+    wrong = [f"has no effects, the model has {names}"] if names else []
+    wrong += [
+        f"is for {name} = {value:g}, the model has {float(getattr(soil, name)):g}"
+        for name, value in FIXED_ANGLE.items()
+        if abs(float(getattr(soil, name)) - value) > 1e-9
+    ]
+    if wrong:
         raise InputError(
-            f"{estimator.path} has no effects, the model has {names}; train a file for this model "
-            "with [set_posterior], or use soilml identify --method posterior"
+            f"{estimator.path} {wrong[0]}; train a file for this model with [set_posterior], or "
+            "use soilml identify --method posterior"
         )
-    for name, value in FIXED_ANGLE.items():
-        if abs(float(getattr(soil, name)) - value) > 1e-9:
-            raise InputError(
-                f"{estimator.path} is for {name} = {value:g}, the model has "
-                f"{float(getattr(soil, name)):g}; train a file for this model with [set_posterior]"
-            )
     warnings: list[Remark] = []
-    upper_bounds = {}
-    for name in ("cohesion", "shear_modulus"):
-        own = prior.get(name)
-        if own is None:
-            raise InputError(f"{name} has no prior; give its range in [soil.prior]")
-        upper_bounds[f"{name}_max"] = own.upper
+    bounded = ("cohesion", "shear_modulus")
+    if missing := [name for name in bounded if name not in prior]:
+        raise InputError(f"{missing[0]} has no prior; give its range in [soil.prior]")
+    upper_bounds = {f"{name}_max": prior[name].upper for name in bounded}
     bearing = float(soil.kc) / float(gear.width) + float(soil.kphi)
     widest = estimator.sets.context_ranges["bearing_std"][1] if estimator.sets else 0.0
     bearing_std = _log_std(prior["kphi"], bearing) if "kphi" in prior else 0.0
@@ -171,21 +169,14 @@ def _prior_differences(estimator: Estimator, case: Case) -> list[Remark]:
     """Priors that differ from those of the file."""
     remarks, used = [], narrower_priors(estimator, case)
     for i, name in enumerate(estimator.names):
-        own, ends = case.prior.get(name), _ends(estimator, i)
-        width = ends[1] - ends[0]
-        if name in used:
-            continue
-        if (
-            own is None
-            or own.log
-            or own.normal_std is not None
-            or max(abs(own.lower - ends[0]), abs(own.upper - ends[1])) > SAME_PRIOR * width
-        ):
-            unit = declared(Soil)[name].unit
-            text = (
-                f"{name}: the file's prior is uniform from {ends[0]:.4g} to {ends[1]:.4g} {unit}; "
-                "that of the model is ignored"
-            )
+        own, (low, high) = case.prior.get(name), _ends(estimator, i)
+        uniform = own is not None and not own.log and own.normal_std is None
+        if own is not None and uniform:
+            off = max(abs(own.lower - low), abs(own.upper - high))
+            uniform = off <= SAME_PRIOR * (high - low)
+        if name not in used and not uniform:
+            text = f"{name}: the file's prior is uniform from {low:.4g} to {high:.4g} "
+            text += f"{declared(Soil)[name].unit}; that of the model is ignored"
             remarks.append(Remark("prior-ignored", text, (name,)))
     others = [path for path in case.prior if path not in (*estimator.names, "kphi")]
     if others:

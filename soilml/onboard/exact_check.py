@@ -32,7 +32,9 @@ NO_ROWS: dict[str, list[float]] = {name: [] for name in REQUIRED_READINGS}
 
 
 def misfit_limit(limits: Mapping[str, Sequence[float]], readings: float) -> float:
-    """The limit `most` of a file for so many readings."""
+    """The limit `most` of a file for so many readings; NaN where the file states none."""
+    if not limits:
+        return math.nan
     numbers, last = limits["readings"], limits["readings"][-1]
     place = math.log(min(max(readings, numbers[0]), last))
     inside = float(np.interp(place, np.log(numbers), limits["most"]))
@@ -49,7 +51,7 @@ def exact_probability(misfit: float, readings: float, limit: float) -> float:
     References: Wilson and Hilferty, Proc. Natl. Acad. Sci. 17, 1931.
     """
     degrees = readings - 1.0 if readings > 2.0 else 1.0
-    if not readings > 0.5:
+    if not (readings > 0.5 and math.isfinite(limit)):
         return math.nan
     third = 1.0 / 3.0
     cube_root = (max(misfit, 0.0) / degrees) ** third - (limit / degrees) ** third

@@ -98,11 +98,10 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
             f"{file} has format {_shown(form)}; this version of soilml reads format {FORMAT}"
         )
     interface = metadata.get("soilml_interface", "1")
-    earlier = [str(number) for number in range(1, int(INTERFACE))]
-    if interface != INTERFACE and not (interface in earlier and "set" not in metadata):
+    if interface not in [str(number) for number in range(1, int(INTERFACE) + 1)]:
         raise ModelFileError(
-            f"{file} has interface {_shown(interface)}; this version of soilml reads {INTERFACE}: "
-            f"{'train it again' if interface in earlier else 'update soilml'}"
+            f"{file} has interface {_shown(interface)}; this version of soilml reads up to "
+            f"{INTERFACE}: update soilml"
         )
     if metadata.get("soilml_kind") == ONE_STEP:
         raise ModelFileError(

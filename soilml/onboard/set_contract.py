@@ -84,7 +84,8 @@ ABSENT_STD = 1e6
 NOT_MEASURED = -1e30
 NOISE_OF_FILE = -1.0
 #: A set is estimated if at least this share of its rows is in range; the others are set aside.
-LEAST_SHARE_IN_RANGE = 0.5
+#: Files of interface 4 and earlier do not state it.
+LEAST_SHARE_IN_RANGE, FORMER_SHARE_IN_RANGE = 0.5, 0.9
 #: Counts in the place of a memory that is not finite: so many rows out of range that every further
 #: set is refused.
 DAMAGED_COUNTS = (0.0, 1e9, 0.0)

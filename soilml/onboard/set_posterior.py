@@ -23,7 +23,7 @@ from soilml.onboard.set_contract import (
     ABSENT_READING,
     ABSENT_STD,
     COMMON_ERROR_INPUTS,
-    ERROR_COLUMNS,
+    FORMER_SHARE_IN_RANGE,
     INFERRED,
     LEAST_STD,
     MEMORY_INPUTS,
@@ -34,6 +34,7 @@ from soilml.onboard.set_contract import (
     OPERATING_STD_INPUTS,
     OPTIONAL_READINGS,
     REQUIRED_READINGS,
+    SENSOR_ERROR_COLUMNS,
     SET_OUTPUTS,
     SET_PREFIX,
     SET_SWITCH,
@@ -65,7 +66,9 @@ class SetPosterior:
     context_ranges: Least and largest value of each context input, which holds for a whole set.
     context_values: Values of the context inputs that were set.
     sets_only: Whether the file has no regressors of single rows.
-    common_errors: Standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`.
+    common_errors: Standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`, as
+        far as the file knows them: those of earlier interfaces know fewer, or none.
+    error_columns: Columns of errors in the residual system.
     least_share_in_range: Share of a set's rows that must be in range; the others are set aside.
     log_torque: Whether the graph takes the logarithm of torque: where the noise of torque has no
         constant part, and in a file for any wheel.
@@ -80,6 +83,7 @@ class SetPosterior:
     context_values: dict[str, float]
     sets_only: bool
     common_errors: dict[str, float]
+    error_columns: int
     least_share_in_range: float
     log_torque: bool = True
     constant_noise: float = 0.0
@@ -88,7 +92,7 @@ class SetPosterior:
     @staticmethod
     def of(metadata: Mapping[str, Any]) -> SetPosterior:
         """From the entry `set` of a file's metadata."""
-        context, errors = metadata["context"].items(), metadata["errors"]
+        context, errors = metadata["context"].items(), metadata.get("errors", {})
         noise = {str(k): (float(v[0]), float(v[1])) for k, v in metadata["noise"].items()}
         constant, _ = noise.get("torque", (0.0, 0.0))
         return SetPosterior(
@@ -97,16 +101,19 @@ class SetPosterior:
             context_ranges={str(k): (float(v[0]), float(v[1])) for k, v in context},
             context_values={},
             sets_only=bool(metadata["alone"]),
-            common_errors={name: float(errors[name]) for name in COMMON_ERROR_INPUTS},
-            least_share_in_range=float(metadata["least_share_in_range"]),
+            common_errors={n: float(errors[n]) for n in COMMON_ERROR_INPUTS if n in errors},
+            error_columns=len(SENSOR_ERROR_COLUMNS) + len(metadata.get("model_errors", ()))
+            if errors
+            else 1,
+            least_share_in_range=float(metadata.get("least_share_in_range", FORMER_SHARE_IN_RANGE)),
             log_torque=metadata.get("kind") == "any wheel" or not constant,
-            misfit_limits=metadata["misfit"],
+            misfit_limits=metadata.get("misfit", {}),
         )
 
     @property
     def columns(self) -> int:
         """Columns of the residual system: monomials, and errors that all rows share."""
-        return self.terms + len(ERROR_COLUMNS)
+        return self.terms + self.error_columns
 
     @property
     def missing_context(self) -> tuple[str, ...]:
@@ -122,7 +129,8 @@ class SetPosterior:
         values = {name: as_number(name, value) for name, value in context.items()}
         common = {name: values.pop(name) for name in COMMON_ERROR_INPUTS if name in values}
         for name, value in common.items():
-            inferred = name == MODEL_ERROR_INPUT and value == self.common_errors[name] == INFERRED
+            self._check_knows(name, value)
+            inferred = name == MODEL_ERROR_INPUT and value == INFERRED
             if not (0.0 <= value < np.inf or inferred):
                 raise InputError(
                     f"{name} is {value:g}; needed is a standard deviation, zero or more"
@@ -144,9 +152,18 @@ class SetPosterior:
             self,
             context_values=values,
             noise=self.noise | parts,
-            common_errors=self.common_errors | common,
+            common_errors={n: common.get(n, v) for n, v in self.common_errors.items()},
             constant_noise=constant if self.log_torque else 0.0,
         )
+
+    def _check_knows(self, name: str, std: float) -> None:
+        """Raise `InputError` for an error that a file of an earlier interface takes as zero."""
+        of_model = name == MODEL_ERROR_INPUT and name not in self.common_errors
+        if (of_model or not self.common_errors) and std != 0.0:
+            raise InputError(
+                f"{name} is {std:g}, but this file of an earlier version takes it as zero: train "
+                "it again, with [set_posterior]"
+            )
 
     def start(self, file: str = "") -> Memory:
         """The memory before the first reading, of the file with this identity."""
@@ -181,7 +198,10 @@ class SetPosterior:
         for name, source in (("torque_std", "torque"), ("torque_bias", "torque_bias")):
             rows[name] = self._std(name, source, rows["torque"], measured, shape)
         for name, source in zip(OPERATING_STD_INPUTS, OPERATING_NOISE, strict=True):
-            rows[name] = self._std(name, source, rows[source], measured, shape)
+            std = self._std(name, source, rows[source], measured, shape)
+            self._check_knows(name, float(std.max(initial=0.0)))
+            if self.common_errors:
+                rows[name] = std
         if self.constant_noise and "torque_std" not in measured:
             factor = constant_noise_factor(rows["torque"], self.constant_noise)
             rows |= {name: rows[name] * factor for name in ("torque", "torque_std")}

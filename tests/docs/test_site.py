@@ -36,7 +36,7 @@ def named_in_trees():
     """Pages in the tree of the first page, as paths; some folders have all their pages in one."""
     index = ROOT / "docs/index.md"
     trees = re.findall(r"```\{toctree\}\n(.*?)```", index.read_text(), flags=re.DOTALL)
-    named = re.findall(r"<(.+)>$", "\n".join(trees), flags=re.MULTILINE)
+    named = re.findall(r"^[\w./-]+$", "\n".join(trees), flags=re.MULTILINE)
     found = {index, *((index.parent / f"{name}.md").resolve() for name in named)}
     for first in page_tree.FOLDERS:
         found |= set((ROOT / first).parent.glob("*.md"))

@@ -24,20 +24,14 @@ MODEL.toml.
   soilml plan next MODEL.toml RUNS.csv --slip 0.1,0.3,0.5 --load 30:120:4
   soilml plan next MODEL.toml --load 30:120:4 --picture map.png
 
-For each candidate, readings are simulated for samples of the soil, averaged
-over explanations of the rows as by soilml identify (of the prior without
-RUNS.csv), and the standard deviation that is left is averaged over them.
-<parameter>_left is this expected standard deviation divided by that of the
-prior (1: nothing learned). The rows of the table are: the best candidate for
-all parameters together and for each parameter, the best
-repetition of a measured row, and the best sequence of --count rows, whose
-widths are those after all rows up to it. --all lists every candidate instead.
+<parameter>_left is the standard deviation that is expected after a row, divided
+by that of the prior (1: nothing learned), over soils drawn as by soilml
+identify. Rows are the best candidate for all parameters together and for each,
+the best repetition of a measured row, and the best sequence of --count rows.
 
 Candidate channels are those whose noise is declared in [noise]: torque alone,
 and torque with each other channel. Without --load, loads from half to twice
-the measured ones are tried. A point is excluded where a twentieth or more of
-the posterior samples does not carry the wheel. Model errors are considered where
-[discrepancy] declares them or [remainder] has them.
+the measured ones are tried.
 
 With --gravity, rate tests made where --tested-at says (on Earth) by what they
 reveal of the drawbar pull of the wheel there, under --target-load:
@@ -45,11 +39,9 @@ reveal of the drawbar pull of the wheel there, under --target-load:
   soilml plan next MODEL.toml --gravity moon --target-load 20 --radius 0.1,0.15
 
 A test has rows at all --slip under a load, with a wheel of a radius.
-pull_left_N is the standard deviation of the pull that is expected after it, by
-the model, with the law of gravity in doubt; scaled_error_N is the error of the
-measured pull times the ratio of the loads, without a model. speed_ratio is the
-speed of the test over that there at equal Froude number. Beside the best tests
-stand those of the same load and of the same mass.
+pull_left_N is the standard deviation of the pull that is expected after it,
+with the law of gravity in doubt; scaled_error_N that of scaling by the loads,
+without a model. speed_ratio is at equal Froude number.
 """
 #: Largest number of rows planned in a sequence, and of operating points (slips times loads).
 MAX_COUNT, MAX_POINTS = 5, 1000
@@ -85,13 +77,11 @@ ARGUMENTS = (
 
 def run(args: argparse.Namespace) -> int:
     """Rate all candidates and write the table."""
-    from functools import partial
-
     import numpy as np
 
     from soilml.cli.option_values import parse_names, parse_numbers
     from soilml.cli.options import available_effects
-    from soilml.cli.output import save_columns, show_rows, tell, write_columns, write_set
+    from soilml.cli.output import deliver, tell, write_columns
     from soilml.cli.progress import working
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.experiment_design import advise, candidate_grid
@@ -162,9 +152,7 @@ def run(args: argparse.Namespace) -> int:
     if args.all:
         rows = [("candidate", c) for c in sorted(advice.choices, key=lambda c: c.overall)]
     columns = advice_columns(advice, rows)
-    write_set({args.out: partial(save_columns, columns), args.picture: report.pictures[0].save})
-    content = {name: np.asarray(values).tolist() for name, values in columns.items()}
-    show_rows(report, columns, content, args.out)
+    deliver(args, report, columns=columns)
     return 0
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 
 from soilml.cli.options import InputFile, OutputFile
-from soilml.io.atomic_files import save_text
 
 FORMATS = ("table", "json")
 DESCRIPTION = """\
@@ -44,13 +43,12 @@ def run(args: argparse.Namespace) -> int:
     """Audit and print or write."""
     from soilml.cli.option_values import parse_costs, parse_names
     from soilml.cli.options import available_effects
-    from soilml.cli.output import show_result, tell
+    from soilml.cli.output import deliver, tell
     from soilml.cli.progress import working
     from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case
     from soilml.fitting.covariance import ignored_discrepancy
     from soilml.gap import audit
-    from soilml.report.page import json_text
 
     design = read_long_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
     costs = parse_costs(args)
@@ -58,9 +56,7 @@ def run(args: argparse.Namespace) -> int:
     case = read_case(args.model, effects, with_explanations=True)
     with working(f"auditing {len(design)} rows"):
         found = audit(case, design, free=parse_names(args.free), effects=effects, costs=costs)
-    if args.out is not None:
-        save_text(args.out, json_text(found.as_json()))
-    show_result(found.report(), found.as_json())
+    deliver(args, found.report(), found.as_json())
     for line in ignored_discrepancy(case, "the audit", "effects are harder to name than it says"):
         tell(line.text)
     return 0

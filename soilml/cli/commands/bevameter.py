@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from soilml.cli.options import SEVERAL, InputFile, OutputFile
 from soilml.errors import InputError, MissingLibraryError, SoilmlError, TableError
-from soilml.io.atomic_files import save_text
 
 if TYPE_CHECKING:
     from soilml.io.table import Table
@@ -19,32 +18,26 @@ if TYPE_CHECKING:
 FORMATS = ("table", "json")
 DESCRIPTION = """\
 Fit kc, kphi and n to plate-sinkage tests, and cohesion, friction angle and
-shear modulus to shear tests. Say what the tests cannot tell: kc apart from kphi
-with plates of one size, cohesion apart from friction at one normal stress, how
-far repeats differ, and where the laws do not fit.
+shear modulus to shear tests. Say what the tests cannot tell, such as kc apart
+from kphi with plates of one size.
 
   soilml bevameter PLATES.csv SHEAR.csv
   soilml bevameter PLATES.csv --model MODEL.toml --out SOIL.toml
   soilml bevameter SHEAR.csv --out SOIL.toml --picture tests.png
 
-Either kind may be missing; their columns tell which is which. Several tables of
-a kind are taken together. A table that cannot be used is left out, with a line
-that says why, and the others are fitted.
+Several tables of a kind are taken together; their columns tell which kind.
 
 PLATES.csv has test, sinkage_m, pressure_Pa or load_N, and the plate:
 plate_radius_m, plate_area_m2 of a round plate, or plate_width_m and
 plate_length_m. SHEAR.csv has test, normal_stress_Pa, shear_displacement_m and
 shear_stress_Pa; for a ring inner_radius_m, outer_radius_m, angle_rad, torque_Nm,
 and load_N or normal_stress_Pa. A blank displacement or angle marks the steady
-end of a test. Without displacements or angles each row is the strength, or the
-largest torque, of a test, and K is not measured. Rows with the same name in the
-column test are one test otherwise. Other names are taken where the header
-states units, such as z [mm] and p [kPa].
+end of a test. Without them each row is the strength of a test, and K is not
+measured. Other names are taken where the header states units, such as z [mm].
 
-The unit is the test, not the sample: ranges follow from how tests scatter. The
-second range is where the value at another place of the soil would lie, and is
-the prior that --out writes for identify and gap, with [[soil.test]]: what the
-tests say of the parameters together. With --model, SOIL.toml is that model file
+Ranges follow from how tests scatter. The second range is where the value at
+another place of the soil would lie, and is the prior that --out writes for
+identify and gap, with [[soil.test]]. With --model, SOIL.toml is that model file
 with this soil; without it, [soil] with priors and tests alone.
 """
 #: Bounds of columns that differ from those of measured runs: a plate starts without load.
@@ -70,12 +63,11 @@ ARGUMENTS = (
 def run(args: argparse.Namespace) -> int:
     """Fit the tests, print the result and write the files."""
     from soilml.cli.options import available_effects, is_json
-    from soilml.cli.output import show_result, tell, write_set
+    from soilml.cli.output import deliver, tell
     from soilml.cli.progress import working
     from soilml.config.case import read_case
     from soilml.identification.bevameter import bevameter
     from soilml.identification.bevameter.soil_section import missing_values, model_file_text
-    from soilml.report.page import json_text
 
     as_json = args.out is not None and is_json(args)
     plates, shear, left = _tables(args)
@@ -83,15 +75,12 @@ def run(args: argparse.Namespace) -> int:
     with working("fitting the tests"):
         result = bevameter(plates, shear, case)
     result = replace(result, remarks=(*left, *result.remarks))
-    report = result.report()
-    write_set({args.picture: report.pictures[0].save})
-    if as_json:
-        save_text(args.out, json_text(result.as_json()))
-    elif args.out is not None:
-        save_text(args.out, model_file_text(result, case, ", ".join(args.tables)))
+    others = {}
+    if args.out is not None and not as_json:
+        others = {args.out: model_file_text(result, case, ", ".join(args.tables))}
         if case is None and (missing := missing_values(result)):
             tell(f"{args.out} lacks {', '.join(missing)}: add them, or give --model")
-    show_result(report, result.as_json())
+    deliver(args, result.report(), result.as_json(), others=others)
     return 0
 
 

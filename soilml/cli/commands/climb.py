@@ -14,10 +14,8 @@ FORMATS = ("table", "json")
 DESCRIPTION = """\
 Identify cohesion, friction angle and shear modulus of the ground from climbs
 of gentle slopes and the measured stress on the rims of a front and a rear
-wheel; then predict drawbar pull against slip and the steepest slope that can
-be climbed.
+wheel; then predict drawbar pull and the steepest slope that can be climbed.
 
-  soilml paper climb ROVER.toml RUNS.csv --stress STRESS.csv
   soilml paper climb ROVER.toml RUNS.csv --stress STRESS.csv --out FOLDER
 
 ROVER.toml describes a rover with four wheels:
@@ -30,15 +28,13 @@ ROVER.toml describes a rover with four wheels:
   [noise]       such as speed_m_s = "0.9 %", slope_rad = 0.005,
                 normal_Pa = "5 %", entry_angle_rad, speed_scale, front_load
 
-RUNS.csv has a row for each wheel of each steady climb, a repetition being a
-run of its own: run, wheel (front or rear), slope_rad, and either slip or
-speed_m_s and rim_speed_m_s. STRESS.csv has a row for each sample: run, wheel,
-angle_rad, normal_Pa, and slip where the run is no climb (imposed slip on level
-ground).
+RUNS.csv has a row for each wheel of each steady climb: run, wheel (front or
+rear), slope_rad, and either slip or speed_m_s and rim_speed_m_s. STRESS.csv has
+a row for each sample: run, wheel, angle_rad, normal_Pa, and slip where the run
+is no climb (imposed slip on level ground).
 
 Each slope gives one equation, so three unknowns need three slopes. The bands
-are 90 % intervals. FOLDER receives report.html (start here), climb.json,
-curve.csv and climbs.csv.
+are 90 % intervals. FOLDER receives report.html, climb.json, curve.csv, climbs.csv.
 """
 
 

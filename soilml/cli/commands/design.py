@@ -10,7 +10,6 @@ from soilml.cli.option_values import NumberFrom, parse_names, whole_number_from
 from soilml.cli.options import InputFile, OutputFile
 
 if TYPE_CHECKING:
-    from soilml.report.page import Content
     from soilml.rover_design.study import DesignStudy
 
 FORMATS = ("table", "json")
@@ -36,26 +35,18 @@ number, a range that is searched, or { values = [...] }:
   radius = 0.09 # m
   width = [0.04, 0.12]
   lug_height = [0.0, 0.015]
-  # lug_count = 24
 
   [soil] # as in a model file; or published ones, each as likely
   names = ["ding2015/hit_lss1", "wang2016/kls1"]
-  # model = "model.toml" and runs = "runs.csv": the soil of measured rows
 
-  [goal]
+  [goal] # also margin, torque_limit, energy_limit, slip_limit, risk
   slope = "15 deg"
-  # margin = 5 (N), torque_limit = 2 (N m), energy_limit = 150 (J/m),
-  # slip_limit = 0.6, risk = 0.05, least = "width" (or energy, torque, ...)
+  least = "width" # or energy, torque, ...
 
-The best design is the one that meets the goal with the probability 1 - risk
-and has the least of `least`; where none does, it is the likeliest. The margin
-is the largest pull up to the slip limit less the weight along the slope. The
-front has the designs that no other one beats in both margin and `least`.
-goal_% is the probability of meeting the goal; p05 and p95 are the ends of
-the 90 % band; lugs_min is the number of lugs that a wheel needs.
-
-The result is JSON in SI units, in the file of --out or in a pipe; a terminal
-shows tables. --report writes a page to read and print.
+The best design meets the goal with the probability 1 - risk and has the least
+of `least`; where none does, it is the likeliest. The margin is the largest pull
+less the weight along the slope. The front has the designs that no other one
+beats in both margin and `least`.
 """
 
 
@@ -76,12 +67,11 @@ ARGUMENTS = (
 
 def run(args: argparse.Namespace) -> int:
     """Compare the designs and write the result."""
-    from soilml.cli.output import show_result, write_with_report
+    from soilml.cli.output import deliver
     from soilml.cli.progress import stage_progress
     from soilml.optional_imports import need
 
     need("scipy", "plan wheels")
-    from soilml.report.page import json_text
     from soilml.rover_design import design
 
     study = _study(args)
@@ -93,14 +83,8 @@ def run(args: argparse.Namespace) -> int:
             optimise=not args.sweep_only,
             progress=progress,
         )
-    content = found.as_json()
     report = found.report(f"Wheels for {Path(args.study).name}")
-    files: dict[str | None, Content] = {
-        args.out: json_text(content),
-        args.picture: report.pictures[0].save,
-    }
-    write_with_report(args, files, lambda: (report, content), study.soil.files)
-    show_result(report, content)
+    deliver(args, report, found.as_json(), read=study.soil.files)
     return 0
 
 

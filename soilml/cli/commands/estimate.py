@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,41 +25,27 @@ Estimate soil parameters, or slip, with the model file MODEL.onnx. The results
 are those of the onboard runtime.
 
   soilml estimate exported/wheel.onnx
-  soilml estimate exported/wheel.onnx RUNS.csv --out estimates.csv
-  soilml estimate exported/wheel.onnx RUNS.csv --by run
+  soilml estimate exported/wheel.onnx RUNS.csv --by run --out estimates.csv
   soilml estimate exported/any_wheel.onnx RUNS.csv --model MODEL.toml --by run
   soilml estimate slip_torque.onnx RUNS.csv --with slip_vibration.onnx
 
 Without a table, one line says what the file is for: wheel, effects and priors.
 --model compares them with those of your model file, and refuses another wheel.
 
-Each row of the table gives mean, standard deviation (_std) and 90 % interval
-(_p05, _p95) of every parameter, and in_range. in_range is 0 where the readings
-lie outside the training data; the estimate is then the prior.
+Each row gives mean, standard deviation (_std) and 90 % interval (_p05, _p95) of
+every parameter, and in_range: 0 where the readings lie outside the training
+data; the estimate is then the prior. A single row is close to the prior. --by
+run pools all rows of a run, and --by all those of all runs, on one soil.
 
-One row gives one equation for three unknowns, so the estimate of a single row
-is close to the prior. --by run pools all rows of a run, which is far more
-accurate, and --by all those of all runs, which must then be on one soil.
 sinkage_m, drawbar_pull_N and <column>_std are used where the table has them,
-slip_std and load_N_std included. Rows out of range are set aside; the estimate
-of a run is the prior where they are more than half of its rows, and widened as
-far as the misfit says where no soil explains the others. The interval includes
-errors of the model of wheel and soil, whose size follows from the residuals of
-the run. --exact-model leaves them out, for a model that was checked on a known
-soil; a [discrepancy] or [remainder] of --model takes their place. With a file of
-a set posterior, disagrees is 1 where the rows of a run fit no exact model, as
-those of one sound run in a hundred: check units, sensors and wheel. A row with
-a blank reading, or whose status is not ok, gets a blank estimate. Slip differs
-from row to row and has no --by.
+slip_std and load_N_std included. The interval includes errors of the model,
+whose size follows from the residuals; --exact-model leaves them out. disagrees
+is 1 where the rows of a run fit no exact model: check units, sensors, wheel.
+A row with a blank reading, or whose status is not ok, gets a blank estimate.
 
---with fuses, row by row, model files that estimate the same parameters from
-other sensors: slip files of one data file by the correlation of their errors,
-others as if their errors were independent; files that read the same sensors
-are then refused. A file takes no part in a row where its reading is blank or
-out of range; the column `files` counts those that do. Standard error reports
-which parameters are not determined, and the next measurement that would help.
-Only numpy and onnxruntime are needed, but for --report, a page to read and
-print. CSV files are in SI units; a terminal shows kPa, degrees and mm.
+--with fuses, row by row, files that estimate the same parameters from other
+sensors; the column `files` counts those that took part. Only numpy and
+onnxruntime are needed, but for --report. CSV files are in SI units.
 """
 
 
@@ -84,12 +69,7 @@ def run(args: argparse.Namespace) -> int:
     need("onnxruntime", "estimate")
     import numpy as np
 
-    from soilml.cli.output import (
-        save_columns,
-        show,
-        show_rows,
-        write_with_report,
-    )
+    from soilml.cli.output import deliver, show
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.config.remainder import SAME_ROWS
     from soilml.experiment_design.expected_answers import trained_case
@@ -156,15 +136,11 @@ def run(args: argparse.Namespace) -> int:
 
     title = f"Estimates of {Path(args.runs).name} by {Path(args.trained).name}"
     report = presentation.estimate_report(columns, remarks, estimators[0], args.by, title)
-    content = {k: np.asarray(v).tolist() for k, v in columns.items()}
-    notes = [remark.as_json() for remark in remarks]
-    write_with_report(
-        args,
-        {args.out: partial(save_columns, columns)},
-        lambda: (report, {"columns": content, "notes": notes}),
-        [str(e.path) for e in estimators],
-    )
-    show_rows(report, columns, content, args.out)
+    content = {
+        "columns": {k: np.asarray(v).tolist() for k, v in columns.items()},
+        "notes": [remark.as_json() for remark in remarks],
+    }
+    deliver(args, report, content, columns, [str(e.path) for e in estimators])
     return 0
 
 
@@ -260,7 +236,7 @@ def _group_estimates(
     """Columns with a line for every value of a column, from all its usable rows, and remarks."""
     import numpy as np
 
-    from soilml.cli.progress import row_progress
+    from soilml.cli.progress import working
     from soilml.experiment_design.next_rows import advice_after_estimate
     from soilml.identification.model_error_inputs import readings_with_model_error
     from soilml.identification.trained_estimator import narrower_priors
@@ -278,8 +254,8 @@ def _group_estimates(
     ]
     box = {} if case is None else narrower_priors(estimator, case)
     counts = np.asarray([len(rows) for _, rows in groups])
-    with row_progress(f"estimating by {by}", estimator, int(counts.sum())) as counted:
-        estimate = table_estimates.estimates_of_runs(counted, readings, box)
+    with working(f"estimating by {by}"):
+        estimate = table_estimates.estimates_of_runs(estimator, readings, box)
     outside = estimate.rows_set_aside
     position = {name: i for i, name in enumerate(names)}
     answered = np.asarray([name in position for name in order])

@@ -25,7 +25,6 @@ and run-to-run scatter, search for the missing effect, name it if the data
 distinguish it from all others, add it to the model, and report how much of the
 gap it closes.
 
-  soilml gap MODEL.toml RUNS.csv --out FOLDER
   soilml gap MODEL.toml RUNS.csv --out FOLDER --holdout run
   soilml gap MODEL.toml RUNS.csv --out FOLDER --holdout load_N=150
 
@@ -37,18 +36,16 @@ error in them appears as an effect.
 RUNS.csv has the columns run, slip, load_N, torque_Nm, and optionally
 drawbar_pull_N, sinkage_m, speed_m_s (below zero in reverse), pass,
 slip_angle_rad, time_s and <column>_std. FOLDER receives report.html (start here),
-gap.json, model.toml (the model with the effect that is missing, or all likely
-explanations with their weights, by whose mixture other commands predict) and
-next_runs.csv (runs to measure next). The exit status is 0 whatever the result,
-3 where the data cannot be analysed, and 2 for bad input.
+gap.json, model.toml (the model with the missing effect, or all likely
+explanations with their weights) and next_runs.csv (runs to measure next). The
+exit status is 0 whatever the result, 3 where the data cannot be analysed, and 2
+for bad input.
 
 Runs of several wheels on one soil: write each as [gears.NAME] in MODEL.toml,
 and name it in the column gear. An effect of one wheel is then grousers@NAME.
 
 --checked torque-gain=0.003 declares the standard deviation of a sensor's fault
-after calibration, in the unit that `soilml show effects` lists. --cost second-pass=3
-gives the cost of a kind of run in next_runs.csv, in any unit; runs are then
-ranked by what they discriminate per cost.
+after calibration. --cost second-pass=3 gives the cost of a kind of run.
 """
 
 

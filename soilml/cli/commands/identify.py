@@ -21,39 +21,28 @@ RUNS.csv.
   soilml identify MODEL.toml RUNS.csv --out result.json
   soilml identify MODEL.toml RUNS.csv --free cohesion,friction_angle
   soilml identify MODEL.toml RUNS.csv --method linear --where run=sand_3
+  soilml identify MODEL.toml RUNS.csv --by run --mean
 
 RUNS.csv has the columns run, slip, load_N, torque_Nm (blank where not
 measured) and optionally drawbar_pull_N, sinkage_m and <column>_std. Rows whose
 status is not ok are ignored. A channel is used where its noise is declared, in
 [noise] or by <column>_std. All rows are assumed to come from one soil, unless
---by run asks for a result for each run. Parameters with a prior are
-identified, unless --free names others. Rows of several wheels name theirs,
-one of [gears.NAME] in MODEL.toml, in the column gear.
+--by run asks for a result for each run; --mean averages them. Rows of several
+wheels name theirs, one of [gears.NAME] in MODEL.toml, in the column gear.
 
 Methods:
   averaged   (default) the soil averaged over explanations of the rows, each
              weighted by its evidence: the model as it is, a smooth error of
              it, effects of the catalogue; typical errors of sensors beside all
 The others assume a perfect model, and sensors with [noise] and [bias] alone:
-  posterior  mean, standard deviation and 90 % interval of the exact posterior
-             under the priors and the noise
+  posterior  the exact posterior under the priors and the noise
   nonlinear  bounded least squares on the full model, from several starts
   linear     cohesion and friction angle from sinkage; shear modulus known
-  newton     friction angle, shear modulus and kphi from a closed form;
-             cohesion known
-
-Use `posterior` only where model and sensors were verified on a known soil. It
-and `averaged` report which parameters the rows do not determine, and the next
-measurement that would help most.
-
---mean averages the groups of --by, with the errors that they share:
-
-  soilml identify MODEL.toml RUNS.csv --by run --mean
+  newton     friction angle, shear modulus and kphi; cohesion known
 
 The verdict comes first; -v shows all of it, and --out FILE.json has the result
-in SI units. --report writes a page to read and print. `left of prior`
-(remaining_fraction in the file) is the width of the estimate divided by that of
-the prior; +- is the expected error. Read the warnings.
+in SI units. `left of prior` (remaining_fraction in the file) is the width of
+the estimate divided by that of the prior. Read the warnings.
 """
 
 
@@ -76,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
 
     from soilml.cli.option_values import parse_names
     from soilml.cli.options import available_effects
-    from soilml.cli.output import show_result, write_with_report
+    from soilml.cli.output import deliver
     from soilml.cli.tables import (
         print_table_hints,
         read_case_of_rows,
@@ -88,7 +77,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.read_table import RUNS
     from soilml.optional_imports import need
     from soilml.remarks import texts
-    from soilml.report.page import json_text
 
     if args.mean and args.by is None:
         raise InputError("--mean averages groups: name their column, such as --by run")
@@ -131,7 +119,6 @@ def run(args: argparse.Namespace) -> int:
             mean = GroupFits(tuple(fits.values())).average
             content["mean"] = mean.as_json() | soil_entries(case, mean, with_draws=False)
         report = group_report(fits, failed, args.by, title, mean)
-    write_with_report(args, {args.out: json_text(content)}, lambda: (report, content))
-    show_result(report, {k: content[k] for k in content if k != "draws"})
+    deliver(args, report, content)
     tell_failures(args.by, failed)
     return 0

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from soilml.config.case import Case
     from soilml.io.table import Table
     from soilml.onboard.estimator import Estimator
-    from soilml.report.page import Content
     from soilml.traction.report import PullReport
     from soilml.traction.rover_report import RoverReport
 
@@ -25,41 +24,29 @@ Predict the drawbar pull of a running gear against slip on the soil of the
 measured rows, and the slope that a vehicle with such gears can climb, both
 with 90 % bands.
 
-  soilml pull MODEL.toml RUNS.csv --picture pull.png
   soilml pull MODEL.toml RUNS.csv --load 80,120 --slip-limit 0.3 --out pull.csv
   soilml pull MODEL.toml RUNS.csv --from exported/wheel.onnx
-
-RUNS.csv is that of `soilml identify`: run, slip, load_N, torque_Nm and, where
-measured, drawbar_pull_N and sinkage_m. The soil (--free names its parameters),
-effects that the model may lack, and its smooth error are drawn together from
-one posterior given the rows, or the soil from the estimate of a trained model
-(--from). All rows are assumed to come from one soil, unless --by run asks for a
-result for each run. A MODEL.toml of gap with several [[explanation]] predicts
-by their mixture.
-
-Loads are those of the rows, unless --load names others. Slips reach 0.6, the
-highest measured slip, or --slip-limit. On a slope, a wheel carries the
-component of its load normal to the slope and pulls the component along it. The
-bands include errors of the model, but neither load transfer nor side slopes.
-
-A model file with [rover] answers for the whole rover, unless --load or --gear
-names one wheel: the slip that slopes need, the margin of pull, the work of the
-wheels for each metre, the steepest slope and the best slip, with the load of
-each wheel on the slope.
-
   soilml pull ROVER.toml RUNS.csv --slope 0,10,15 --gravity moon
   soilml pull MODEL.toml RUNS.csv --load 20 --gravity 1.62 --tested-at 9.81
 
---gravity predicts for another gravity than that of the rows, which is that of
-[rover], else the Earth's, or --tested-at. Loads are those of the prediction.
-How a soil changes with gravity is disputed: by default the law is open, and
-the bands contain that doubt; --gravity-law constant or proportional is one of
-the two schools.
+RUNS.csv is that of `soilml identify`. Soil, effects that the model may lack and
+its smooth error are drawn from one posterior given the rows, or the soil from
+the estimate of a trained file (--from). All rows are assumed to come from one
+soil, unless --by run asks for a result for each run.
+
+Loads are those of the rows, unless --load names others; slips reach 0.6, the
+highest measured slip, or --slip-limit. The bands include errors of the model,
+but neither load transfer nor side slopes.
+
+A model file with [rover] answers for the whole rover, unless --load or --gear
+names one wheel: the slip that slopes need, the margin of pull, the work of the
+wheels for each metre, the steepest slope and the best slip.
+
+--gravity predicts for another gravity than that of the rows. How a soil changes
+with it is disputed: by default the law is open, and in the bands.
 
 pull, p05, p95 are the median and the 90 % band; `prior` is the band before any
-measurement. A value with a warning that it is not known is no more accurate
-than the prior. The CSV file has a row for each load and slip, in SI units.
---report writes a page to read and print.
+measurement. The CSV file has a row for each load and slip, in SI units.
 """
 MAX_LOADS = 8  # Largest number of loads
 
@@ -181,7 +168,7 @@ def _write_results(
     found: Mapping[str, PullReport | RoverReport],
     failed: Mapping[str, str],
 ) -> None:
-    """Write --out, --picture and --report as one set; then text, or CSV into a pipe.
+    """Deliver the results.
 
     found: Results by group of --by; one under "" without groups.
     failed: Why other groups have none.
@@ -190,9 +177,8 @@ def _write_results(
 
     import numpy as np
 
-    from soilml.cli.output import show_result, show_rows, write_with_report
+    from soilml.cli.output import deliver
     from soilml.cli.tables import tell_failures
-    from soilml.io.text_tables import csv_text
     from soilml.report.report import by_group
 
     parts: list[dict[str, Any]] = []
@@ -213,13 +199,5 @@ def _write_results(
         "warnings": {n: [remark.as_json() for remark in r.remarks] for n, r in reports.items()},
         "failed": dict(failed),
     }
-    files: dict[str | None, Content] = {
-        args.out: csv_text(columns),
-        args.picture: report.pictures[0].save,
-    }
-    write_with_report(args, files, lambda: (report, content))
-    if args.out is None and args.report is None:
-        show_rows(report, columns, content)
-    else:
-        show_result(report, content)
+    deliver(args, report, content, columns)
     tell_failures(args.by, failed)

@@ -52,7 +52,7 @@ ARGUMENTS = (
 
 def run(args: argparse.Namespace) -> int:
     """Solve the balances and write the table."""
-    from soilml.cli.output import write_rows
+    from soilml.cli.output import deliver
     from soilml.config.case import read_case_of_one_gear
     from soilml.physics.effects import EFFECTS
     from soilml.physics.gears import Wheel
@@ -87,5 +87,5 @@ def run(args: argparse.Namespace) -> int:
         runs, stresses, wheel, strength, args.reference, discs=discs, model=(case.model, soil)
     )
     report = found.report(f"Pull of {args.model} from the stress on its rim")
-    write_rows(report, found.columns, args.out, args.picture)
+    deliver(args, report, columns=found.columns)
     return 0

@@ -26,13 +26,9 @@ Ranges are start:stop:count, or values with commas. With --run, `soilml
 identify` can read the table. A row without equilibrium has blank values and
 the reason in the column `status`; it is an error if no row has an equilibrium.
 The mean of a [remainder] of MODEL.toml is added; --std gives its uncertainty.
---efficiency adds the power at the drawbar over that of the drive, (1 - s) r DP/T,
-and the share of the thrust that is left as pull (Comin and Saaj 2017, eq. 32),
-with its class: non-trafficable, unsafe from 35 %, safe from 50 %, trafficable
-from 65 %. --balance adds how a track stands: shares of the load, trim, sinkage of
-the rear wheel, tension, centre of pressure.
-Without --out the table is printed, aligned on a terminal and as CSV into a
-pipe.
+--efficiency adds tractive efficiency (1 - s) r DP/T, and pull efficiency with
+its class (Comin and Saaj 2017, eq. 32). --balance adds how a track stands:
+shares of the load, trim, sinkage of the rear wheel, tension.
 """
 
 _ONCE_RADIANS = 1.6  # Largest slip angle in radians, the unit of the version before

@@ -41,13 +41,11 @@ ARGUMENTS = (
 
 def run(args: argparse.Namespace) -> int:
     """Infer and write."""
-    from soilml.cli.options import available_effects, is_json
-    from soilml.cli.output import show_result, show_rows, write_set
+    from soilml.cli.options import available_effects
+    from soilml.cli.output import deliver
     from soilml.cli.progress import working
     from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case
-    from soilml.io.text_tables import csv_text
-    from soilml.report.page import json_text
     from soilml.slip_filter.drive import read_drive, slip_of_drive
     from soilml.slip_filter.presentation import (
         drive_columns,
@@ -61,12 +59,5 @@ def run(args: argparse.Namespace) -> int:
     with working(f"inferring from {len(rows.time)} rows"):
         found = slip_of_drive(case, rows)
 
-    report, columns, content = report_of_drive(found), drive_columns(found), drive_json(found)
-    whole = args.out is not None and is_json(args)
-    table = json_text(content) if whole else csv_text(columns)
-    write_set({args.out: table, args.picture: report.pictures[0].save})
-    if args.out is None:
-        show_rows(report, columns, content)
-    else:
-        show_result(report, content)
+    deliver(args, report_of_drive(found), drive_json(found), drive_columns(found))
     return 0

@@ -45,7 +45,7 @@ ARGUMENTS = (
 def run(args: argparse.Namespace) -> int:
     """Evaluate the log and write the table."""
     from soilml.cli.option_values import parse_numbers
-    from soilml.cli.output import write_rows
+    from soilml.cli.output import deliver
     from soilml.config.case import read_case_of_one_gear
     from soilml.io.read_table import read_table
     from soilml.physics.effects import EFFECTS
@@ -62,5 +62,5 @@ def run(args: argparse.Namespace) -> int:
         pitch, tip, friction, yielding = sizes
         grousers = DiscreteGrousers(pitch=pitch, tip=tip, friction=friction, yielding=yielding)
     found = evaluate_log(case, log, 0.5 * args.mass * 9.81, args.spacing, grousers)
-    write_rows(found.report(), found.columns, args.out, args.picture)
+    deliver(args, found.report(), columns=found.columns)
     return 0

@@ -23,24 +23,18 @@ and what they mean for a heavy rover that is to follow.
 STRIDES.csv has a row for each stride: run, slip, and one or more of torque_Nm
 (at midstance), vibration_m_s2 (largest acceleration after it) and sinkage_m
 (at midstance); blank where not measured. `soilml import` makes it from a log.
-Each sensor has an estimate, with a standard deviation, and `fused` is that of
-all by the weights of eq. 30. Standard deviations include the error that all
-strides on a soil share, as large as on the four soils of the source (table
-VIII): more strides do not lessen it.
+`fused` is the estimate by all sensors (eq. 30). Standard deviations include the
+error that all strides on a soil share (table VIII).
 
 The last row of each soil has k_phi and the pull efficiency of a wheel of a
-300 kg rover (eq. 32) with its class: non-trafficable, unsafe from 35 %, safe
-from 50 %, trafficable from 65 %. Strides show neither n nor cohesion nor shear
-modulus: these are uniform over the four soils of the source, unless --assume
-has them. --wheel has another wheel.
+300 kg rover (eq. 32) with its class. n, cohesion and shear modulus, which
+strides do not show, are uniform over the four soils of the source, unless
+--assume has them. --wheel has another wheel.
 
 On a known soil the same relations give the slip of each stride:
 
   soilml paper wheel-leg STRIDES.csv --known SSC-2
   soilml paper wheel-leg STRIDES.csv --known 35.8,22000     degrees and Pa, 1 cm deep
-
-with that of torque and vibration, and `slip`, fused by eq. 26. A column slip of
-STRIDES.csv is then passed on as slip_measured.
 
 The relations are of one wheel-leg: five legs, Load Testing Feet, 3.75 kg. For
 another train a file on its strides: soilml train slip_torque.
@@ -129,7 +123,7 @@ def _known_soil(text: str) -> tuple[float, float]:
 
 def _soil(args: argparse.Namespace, table: Table) -> int:
     """The soil by each sensor and fused, and what it means for a heavy rover."""
-    from soilml.cli.output import write_rows
+    from soilml.cli.output import deliver
     from soilml.cli.tables import result_by_group
     from soilml.systems.wheel_legs import Mobility, StrideSoil, mobility, soil_of_strides
     from soilml.systems.wheel_legs.strides import stride_report
@@ -143,7 +137,7 @@ def _soil(args: argparse.Namespace, table: Table) -> int:
 
     found, failed = result_by_group(args, table, "estimating", estimate)
     report, rows = stride_report(found, failed, args.by)
-    write_rows(report, rows, args.out, args.picture)
+    deliver(args, report, columns=rows)
     return 0
 
 

@@ -7,7 +7,6 @@ ones follow from those reported.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Array, Real, namespace
@@ -17,7 +16,14 @@ from soilml.physics.effects.base import Effect, EffectCard
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import MOST_SLIP, Operating
 
-_linear_error = partial(EffectCard, source="linear sensor error", kind="sensor")
+
+def _linear_error(
+    what: str, size: float, calibration: float, signs: dict[str, int], isolate: str
+) -> EffectCard:
+    """The card of a gain or an offset."""
+    reference = {"gain" if what.endswith("scale") else "offset": size}
+    text, source = f"the {what} is off", "linear sensor error"
+    return EffectCard(text, source, "sensor", reference, signs, isolate, calibration=calibration)
 
 
 def signed_by_travel(value: Real, load_case: LoadCase) -> Array:
@@ -34,157 +40,148 @@ def signed_by_travel(value: Real, load_case: LoadCase) -> Array:
     return namespace(value).where(speed < 0, -value, value)
 
 
+@dataclass(frozen=True, kw_only=True)
+class _ChannelGain(Effect):
+    """A channel y is read as (1 + e) y: sensor error of first order."""
+
+    channel: ClassVar[str]
+    gain: Annotated[Real, Parameter("1", -0.5, 0.5, "e, share read too much")] = 0.0
+
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
+        return replace(force, **{self.channel: getattr(force, self.channel) * (1.0 + self.gain)})
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ChannelOffset(Effect):
+    """A channel y is read as y + d y_0: sensor error of first order.
+
+    d = -1 where the sensor is bolted to the rig and the travel speed is given and below zero, else
+    1 (`signed_by_travel`).
+    """
+
+    channel: ClassVar[str]
+    offset: Real = 0.0
+
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
+        own = self.channel == "sinkage"
+        added = self.offset if own else signed_by_travel(self.offset, load_case)
+        return replace(force, **{self.channel: getattr(force, self.channel) + added})
+
+
 @final
 @dataclass(frozen=True, kw_only=True)
-class TorqueOffset(Effect):
+class TorqueOffset(_ChannelOffset):
     r"""The torque sensor does not read zero when nothing turns it.
 
     .. math:: T' = T + d T_0
 
-    with d = -1 where the travel speed is given and below zero, else 1 (`signed_by_travel`).
-    References: sensor error of first order. Constant over a campaign; a zero that drifts with
-    temperature is not of this form.
+    Constant over a campaign; a zero that drifts with temperature is not of this form. References:
+    sensor error of first order.
     """
 
-    name: ClassVar[str] = "torque-offset"
-    about: ClassVar[EffectCard] = _linear_error(
-        text="the torque sensor's zero is off",
-        reference={"offset": 0.1},
-        signs={"torque": +1},
-        isolate="reading the torque with the wheel lifted; the same runs driven the other way",
-        calibration=0.05,
+    name, channel = "torque-offset", "torque"
+    about = _linear_error(
+        "torque sensor's zero", 0.1, 0.05, {"torque": +1}, "the wheel lifted; runs driven both ways"
     )
     offset: Annotated[Real, Parameter("N m", -100.0, 100.0, "T0, reading at no torque")] = 0.0
-
-    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
-        return replace(force, torque=force.torque + signed_by_travel(self.offset, load_case))
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class TorqueGain(Effect):
+class TorqueGain(_ChannelGain):
     r"""The torque sensor reads a share too much, or too little.
 
     .. math:: T' = (1 + e) T
 
-    References: sensor error of first order. A torque computed from motor current with a wrong
-    torque constant is of this form too; friction of the gears is not.
+    A torque computed from motor current with a wrong torque constant is of this form too; friction
+    of the gears is not. References: sensor error of first order.
     """
 
-    name: ClassVar[str] = "torque-gain"
-    about: ClassVar[EffectCard] = _linear_error(
-        text="the torque sensor's scale is off",
-        reference={"gain": 0.03},
-        signs={"torque": +1},
-        isolate="a dead weight on a lever of known length",
-        calibration=0.03,
+    name, channel = "torque-gain", "torque"
+    about = _linear_error(
+        "torque sensor's scale",
+        0.03,
+        0.03,
+        {"torque": +1},
+        "a dead weight on a known lever",
     )
-    gain: Annotated[Real, Parameter("1", -0.5, 0.5, "e, share read too much")] = 0.0
-
-    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
-        return replace(force, torque=force.torque * (1.0 + self.gain))
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class DrawbarOffset(Effect):
+class DrawbarOffset(_ChannelOffset):
     r"""The drawbar sensor does not read zero when nothing pulls.
 
     .. math:: DP' = DP + d F_0
 
-    with d = -1 where the travel speed is given and below zero, else 1 (`signed_by_travel`).
-    References: sensor error of first order; friction of the carriage, which opposes the travel in
-    both directions, is not of this form.
+    Friction of the carriage, which opposes the travel in both directions, is not of this form.
+    References: sensor error of first order.
     """
 
-    name: ClassVar[str] = "drawbar-offset"
-    about: ClassVar[EffectCard] = _linear_error(
-        text="the drawbar sensor's zero is off",
-        reference={"offset": 0.5},
-        signs={"drawbar_pull": +1},
-        isolate="reading the drawbar with the wheel lifted; the same runs driven the other way",
-        calibration=0.5,
+    name, channel = "drawbar-offset", "drawbar_pull"
+    about = _linear_error(
+        "drawbar sensor's zero", 0.5, 0.5, {"drawbar_pull": +1}, "the wheel lifted; runs both ways"
     )
     offset: Annotated[Real, Parameter("N", -200.0, 200.0, "F0, reading at no pull")] = 0.0
-
-    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
-        return replace(
-            force, drawbar_pull=force.drawbar_pull + signed_by_travel(self.offset, load_case)
-        )
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class DrawbarGain(Effect):
+class DrawbarGain(_ChannelGain):
     r"""The drawbar sensor reads a share too much, or too little.
 
     .. math:: DP' = (1 + e) DP
 
-    References: sensor error of first order. It says nothing of a sensor that also feels the load.
+    It says nothing of a sensor that also feels the load. References: sensor error of first order.
     """
 
-    name: ClassVar[str] = "drawbar-gain"
-    about: ClassVar[EffectCard] = _linear_error(
-        text="the drawbar sensor's scale is off",
-        reference={"gain": 0.03},
-        signs={},
-        isolate="a dead weight on the drawbar over a pulley",
-        calibration=0.03,
+    name, channel = "drawbar-gain", "drawbar_pull"
+    about = _linear_error(
+        "drawbar sensor's scale", 0.03, 0.03, {}, "a dead weight on the drawbar over a pulley"
     )
-    gain: Annotated[Real, Parameter("1", -0.5, 0.5, "e, share read too much")] = 0.0
-
-    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
-        return replace(force, drawbar_pull=force.drawbar_pull * (1.0 + self.gain))
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class SinkageOffset(Effect):
+class SinkageOffset(_ChannelOffset):
     r"""The sinkage is measured from a level that is not that of the soil.
 
     .. math:: z' = z + z_0
 
-    References: sensor error of first order. The surface is taken as level; one that was raked
-    unevenly is noise, not this.
+    The surface is taken as level; one that was raked unevenly is noise, not this. References:
+    sensor error of first order.
     """
 
-    name: ClassVar[str] = "sinkage-offset"
-    about: ClassVar[EffectCard] = _linear_error(
-        text="the sinkage sensor's zero is off",
-        reference={"offset": 0.001},
-        signs={"sinkage": +1},
-        isolate="reading the sinkage with the wheel on a plate level with the soil",
-        calibration=0.0005,
+    name, channel = "sinkage-offset", "sinkage"
+    about = _linear_error(
+        "sinkage sensor's zero",
+        0.001,
+        0.0005,
+        {"sinkage": +1},
+        "the wheel on a plate at soil level",
     )
     offset: Annotated[Real, Parameter("m", -0.1, 0.1, "z0, reading at no sinkage")] = 0.0
-
-    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
-        return replace(force, sinkage=force.sinkage + self.offset)
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class SinkageGain(Effect):
+class SinkageGain(_ChannelGain):
     r"""The sinkage sensor reads a share too much, or too little.
 
     .. math:: z' = (1 + e) z
 
-    References: sensor error of first order, such as an arm whose length is not what was written
-    down; for angles so small that its height is proportional to its angle.
+    Such as an arm whose length is not what was written down; for angles so small that its height is
+    proportional to its angle. References: sensor error of first order.
     """
 
-    name: ClassVar[str] = "sinkage-gain"
-    about: ClassVar[EffectCard] = _linear_error(
-        text="the sinkage sensor's scale is off",
-        reference={"gain": 0.03},
-        signs={"sinkage": +1},
-        isolate="reading the sinkage on blocks of known height",
-        calibration=0.03,
+    name, channel = "sinkage-gain", "sinkage"
+    about = _linear_error(
+        "sinkage sensor's scale",
+        0.03,
+        0.03,
+        {"sinkage": +1},
+        "blocks of known height",
     )
-    gain: Annotated[Real, Parameter("1", -0.5, 0.5, "e, share read too much")] = 0.0
-
-    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
-        return replace(force, sinkage=force.sinkage * (1.0 + self.gain))
 
 
 @final
@@ -200,11 +197,11 @@ class LoadGain(Effect):
 
     name: ClassVar[str] = "load-gain"
     about: ClassVar[EffectCard] = _linear_error(
-        text="the load cell's scale is off",
-        reference={"gain": 0.03},
-        signs={"torque": -1, "sinkage": -1},
-        isolate="weighing the wheel on its stand",
-        calibration=0.03,
+        "load cell's scale",
+        0.03,
+        0.03,
+        {"torque": -1, "sinkage": -1},
+        "weighing the wheel on its stand",
     )
     gain: Annotated[Real, Parameter("1", -0.5, 0.5, "e, share read too much")] = 0.0
 
@@ -258,8 +255,10 @@ class SlipOffset(Effect):
     """
 
     name: ClassVar[str] = "slip-offset"
-    about: ClassVar[EffectCard] = _linear_error(
+    about: ClassVar[EffectCard] = EffectCard(
         text="the reported slip is off by a constant",
+        source="linear sensor error",
+        kind="sensor",
         reference={"offset": 0.015},
         signs={"torque": -1, "drawbar_pull": -1},
         isolate="rolling the wheel unpowered on hard ground: its slip there is nil",

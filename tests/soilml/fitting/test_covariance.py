@@ -17,12 +17,6 @@ def test_whitened_values_have_the_inverse_covariance_as_product():
     assert root.T @ root == pytest.approx(np.linalg.inv(covariance))
 
 
-def test_without_columns_values_are_divided_by_their_noise():
-    whitening, expected = Whitening.of(STD[0], np.zeros((12, 0))), RESIDUAL / STD[0]
-    assert whitening @ RESIDUAL.T == pytest.approx(expected.T)
-    assert whitening @ RESIDUAL[0] == pytest.approx(expected[0])
-
-
 @pytest.mark.parametrize("std", [STD, np.tile(STD[0], (4, 1))])
 @pytest.mark.parametrize("columns", [COLUMNS, COLUMNS[:, :0]])
 def test_likelihood_is_that_of_the_full_covariance(columns, std):

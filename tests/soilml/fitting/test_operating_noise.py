@@ -30,12 +30,6 @@ def test_noise_is_the_slope_times_that_of_slip_and_load():
     assert found == pytest.approx(np.hypot(by_slip, by_load), rel=0.02)
 
 
-def test_exact_slip_and_load_add_nothing():
-    case = case_of()
-    readings = stack_readings(case, driven(case))
-    assert not noise_of_operation(case, readings).any()
-
-
 def test_a_row_that_nothing_carries_beside_it_counts_as_exact():
     case = case_of(MODEL.replace('torque_Nm = "1 %"', 'torque_Nm = "1 %"\nload_N = 30.0'))
     readings = stack_readings(case, driven(case, loads=(50.0, 70.0, 90.0)))

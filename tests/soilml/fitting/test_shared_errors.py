@@ -16,7 +16,7 @@ from soilml.fitting.usable_readings import usable_readings
 from soilml.identification import METHODS
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
-from soilml.physics.effects.exit_angle import ExitAngle
+from soilml.physics.effects.contact_shape import ExitAngle
 from soilml.physics.effects.sensors import SlipOffset
 
 TRUTH = {"cohesion": 812.0, "friction_angle": 0.6, "shear_modulus": 0.012}
@@ -137,13 +137,6 @@ def test_what_is_declared_or_unknown_is_no_usual_error(case):
     assert "bearing" not in usual_errors(case, load, ["kphi"])
     with_effect = replace(case, model=case.model + SlipOffset(offset=0.01))
     assert "slip_bias" not in usual_errors(with_effect, load, ["cohesion"])
-
-
-def test_a_closed_form_takes_the_model_as_right(case):
-    table = measured(case, np.random.default_rng(4))
-    biased = replace(case, bias={"slip": Noise(constant=0.01)})
-    fit = identify(biased, table, method="newton")
-    assert "bias-ignored" in {remark.code for remark in fit.warnings}
 
 
 def test_columns_are_differences_of_readings_with_and_without_each_error(case):

@@ -126,14 +126,6 @@ def test_rows_that_disagree_with_a_test_are_remarked_on():
     )
 
 
-def test_closed_form_says_that_it_ignores_tests():
-    case = a_case(soil_tests=(SHEAR,), noise={})
-    force = case.model(case.soil, Operating(slip=SLIP, load=LOAD))
-    rows = {"slip": SLIP, "load_N": LOAD, "torque_Nm": force.torque, "sinkage_m": force.sinkage}
-    fit = identify(case, Table(rows), method="linear")
-    assert "the linear method ignores [[soil.test]]" in texts(fit.warnings)
-
-
 def test_draws_of_the_prior_follow_tests():
     case = a_case(soil_tests=(SHEAR,))
     free = select_free(case, None)

@@ -47,16 +47,6 @@ def test_noise_of_slip_and_load_is_read_from_their_own_columns(case, table):
     assert np.isfinite(identify(case, huge, SHEAR, method="nonlinear").std).all()
 
 
-@pytest.mark.parametrize("column, std", [("slip_std", 0.05), ("load_N_std", 4.0)])
-def test_a_closed_form_says_that_it_leaves_out_noise_of_slip_or_of_load(case, table, column, std):
-    shaky = changed(table, **{column: np.full(12, std)})
-    said = " ".join(texts(identify(case, shaky, SHEAR, "newton").warnings))
-    assert "newton method does not propagate noise of slip and load" in said
-    assert "not propagate noise" not in " ".join(
-        texts(identify(case, table, SHEAR, "newton").warnings)
-    )
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["nonlinear", "newton"])
 def test_a_reading_of_zero_with_relative_noise_has_finite_weight(case, table, method):
@@ -104,12 +94,6 @@ def test_rows_whose_status_is_not_ok_are_excluded_and_counted(case, table):
     assert "2 rows are excluded: the status is not ok" in texts(fit.warnings)
     with pytest.raises(InputError, match=r"log\.csv: no row has the status ok"):
         identify(case, changed(table, status=np.full(12, "no peak")), SHEAR, method="nonlinear")
-
-
-def test_a_method_of_fixed_unknowns_reports_parameters_not_requested(case, table):
-    said = " ".join(texts(identify(case, table, ["friction_angle"], "newton").warnings))
-    assert "shear_modulus, kphi identified too, although not requested" in said
-    assert "not requested" not in " ".join(texts(identify(case, table, None, "nonlinear").warnings))
 
 
 def test_rows_cannot_be_grouped_by_blank_cells(table):

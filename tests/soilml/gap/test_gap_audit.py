@@ -96,17 +96,6 @@ def test_runs_to_add_gain_what_could_not_be_named(found):
     assert "rate" in rate.gained
 
 
-def test_the_audit_as_json_has_the_same_figures(found):
-    content = found.as_json()
-    first, entry = found.effects[0], content["effects"][0]
-    assert (entry["name"], entry["signal"]) == (first.name, first.signal)
-    assert entry["residual_signal"] == first.residual_signal
-    assert entry["nameable"] == (first.separating_snr >= 3.0)
-    assert content["untestable"] == {n: r.as_json() for n, r in found.untestable.items()}
-    assert [r["nameable"] for r in content["added_runs"]] == [r.nameable for r in found.added_runs]
-    assert content["classes"] == [list(c) for c in found.classes]
-
-
 def test_an_audit_needs_noise():
     case = case_of()
     silent = case_of().__class__(**{**case.__dict__, "noise": {}})

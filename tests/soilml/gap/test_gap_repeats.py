@@ -9,7 +9,6 @@ from gap_sets import case_of, driven
 from soilml.fitting.readings import stack_readings
 from soilml.gap import gap
 from soilml.gap.repeats import (
-    _pair_sentence,
     repeat_disagreement,
 )
 from soilml.inference.gaussian_terms import scatter_columns
@@ -76,11 +75,6 @@ def test_small_differences_of_slip_are_subtracted():
     assert raw[0].chi_square > 10.0 and exact[0].chi_square == 0.0
 
 
-def test_rows_without_repeats_are_not_compared():
-    case = case_of()
-    assert repeat_disagreement(stack_readings(case, driven(case))) == []
-
-
 def test_the_channel_whose_repeats_disagree_most_comes_first():
     case = case_of()
     readings = stack_readings(case, driven(case, loads=(40.0, 40.0, 90.0), noise=0.0))
@@ -95,29 +89,6 @@ def test_the_channel_whose_repeats_disagree_most_comes_first():
     assert found[0].p_value == found[1].p_value == 0.0 < found[2].p_value < 0.05
     expected = 8 * 90.0**2 / 2.0  # eight pairs, each with the variance of two readings
     assert found[0].chi_square == pytest.approx(expected, rel=1e-6)
-
-
-@pytest.mark.parametrize(
-    "values, said",
-    [
-        ((2.0, 3.0), "torque 2 and 3 N m, which differ by 50 %"),
-        ((-3.0, -2.0), "torque -3 and -2 N m, which differ by 50 %"),
-        ((0.31, 3.0), "torque 0.31 and 3 N m, which differ by 868 %"),
-        ((0.29, 3.0), "torque 0.29 and 3 N m, which differ by 2.7 N m"),
-        ((-1.0, 3.0), "torque -1 and 3 N m, which differ by 4 N m"),
-        ((0.0, 3.0), "torque 0 and 3 N m, which differ by 3 N m"),
-        ((0.0, 0.0), "torque 0 and 0 N m, which differ by 0 N m"),
-    ],
-)
-def test_a_difference_is_in_per_cent_where_the_smaller_reading_is_a_tenth(values, said):
-    case = case_of()
-    readings = stack_readings(case, driven(case, loads=TWICE, noise=0.0))
-    reading = readings.measured.copy()
-    reading[[3, 11]] = values
-    sentence = _pair_sentence(replace(readings, measured=reading), 3, 11)
-    assert sentence.endswith(f"under 40 N: {said}")
-    own = _pair_sentence(replace(readings, measured=reading), 3, 3)
-    assert own.startswith("two rows of run run_0 at slip 0.29")
 
 
 def about_large_noise(table):

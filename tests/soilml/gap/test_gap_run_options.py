@@ -2,12 +2,11 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from gap_sets import case_of, driven
 
 from soilml.fitting.readings import stack_readings
-from soilml.gap.run_options import _unvaried, run_options
+from soilml.gap.run_options import run_options
 
 CASE = case_of()
 
@@ -79,60 +78,6 @@ def test_covariates_of_the_driven_rows_are_kept():
     varied = options(speed=[0.02, 0.1, 0.5])
     assert "other speed" not in varied and "reverse" in varied
     assert "reverse" not in options(speed=[-0.02, 0.1, 0.5])
-
-
-@pytest.mark.parametrize("highest, proposed", [(0.69, True), (0.71, False)])
-def test_higher_slips_are_proposed_where_a_tenth_is_left(highest, proposed):
-    slip = np.tile(np.linspace(0.06, highest, 8), 3)
-    assert ("higher slip" in options(changed={"slip": slip})) == proposed
-
-
-def test_braking_is_proposed_unless_it_was_driven():
-    slip = np.tile(np.linspace(0.0, 0.6, 8), 3)
-    assert "braking" in options(changed={"slip": slip})
-    slip[0] = -0.01
-    assert "braking" not in options(changed={"slip": slip})
-
-
-def test_slips_of_an_own_are_proposed_where_hardly_any_were_driven():
-    slip = np.full(24, 0.3)
-    slip[:3] += 0.01
-    assert options(changed={"slip": slip})["lighter"].at.slip.tolist() == pytest.approx(
-        [0.05, 0.15, 0.2, 0.3, 0.35, 0.45, 0.5, 0.6]
-    )
-
-
-@pytest.mark.parametrize("most, load", [(140.0, 135.0), (120.0, 112.0), (100.0, None)])
-def test_of_two_heavier_loads_the_first_that_the_soil_carries_is_proposed(monkeypatch, most, load):
-    monkeypatch.setattr(
-        "soilml.gap.run_options.carried_rows", lambda case, at: np.asarray(at.load) < most
-    )
-    found = options()
-    assert ("heavier" in found) == (load is not None)
-    if load is not None:
-        assert set(found["heavier"].at.load.tolist()) == {load}
-
-
-@pytest.mark.parametrize("rows, proposed", [(2, False), (3, True)])
-def test_rows_that_the_soil_does_not_carry_are_left_out(monkeypatch, rows, proposed):
-    monkeypatch.setattr(
-        "soilml.gap.run_options.carried_rows",
-        lambda case, at: np.arange(len(at.slip)) < rows,
-    )
-    found = options()
-    assert bool(found) == proposed
-    for option in found.values():
-        assert len(option.at.slip) == len(option.at.load) == rows
-        assert option.plain is None or len(option.plain.slip) == rows
-    if proposed:
-        assert found["higher slip"].at.slip.max() == pytest.approx(0.66)
-
-
-@pytest.mark.parametrize(
-    "value, unvaried", [(None, True), ([0.1, 0.1], True), ([0.1, 0.11], False)]
-)
-def test_a_covariate_is_unvaried_where_it_is_unknown_or_one_number(value, unvaried):
-    assert _unvaried(value if value is None else np.asarray(value)) == unvaried
 
 
 def test_with_several_gears_each_run_is_proposed_for_each():

@@ -19,7 +19,7 @@ from soilml.gap.results import (
     RemainingDiscrepancy,
     Suspect,
 )
-from soilml.gap.sentences import _odds, headline, report_lines
+from soilml.gap.sentences import headline, report_lines
 from soilml.remarks import Remark, texts
 
 FIGURES = {"train": GapReduction(8.8, 1.1, {}, 96, "all rows fitted")}
@@ -95,14 +95,6 @@ def test_without_a_cause_the_first_reason_is_stated():
     assert "left" not in lines("unknown", discrepancy={"torque_Nm": LEFT["torque_Nm"]})
 
 
-def test_a_gap_of_the_size_of_noise_is_a_pattern():
-    small = {"train": GapReduction(1.02, 1.0, {}, 90, "all rows fitted")}
-    assert said("unknown", gap=small, gap_probability=0.9935) == (
-        "There is a gap that no effect explains better than a smooth error (residuals form a "
-        "pattern that noise does not; probability 0.99)."
-    )
-
-
 def test_what_is_left_says_beside_which_explanation_and_what_its_cause_is_like():
     worst = replace(LEFT["drawbar_pull_N"], description="measured above the model by up to 5.0 N")
     suspects = (Suspect(("a", "b"), 0.0, 0.5),)
@@ -145,15 +137,6 @@ def test_a_reason_names_the_explanation_that_it_is_about(code, about, words):
     assert lines("suspected", reasons=reasons)["why"] == f"Why no cause is named: {words}."
 
 
-def test_many_reasons_are_several_sentences():
-    reasons = tuple(remark(f"this reason {i} has eight words in all") for i in range(4))
-    one = "this reason {} has eight words in all"
-    assert lines("suspected", reasons=reasons)["why"] == (
-        f"Why no cause is named: {one.format(0)}; {one.format(1)}; {one.format(2)}. "
-        f"T{one.format(3)[1:]}."
-    )
-
-
 def test_residuals_beyond_the_noise_are_no_disagreement_of_measurements():
     misfit = NoiseAgreement(6.25, True, 6.25, 0.0, 0.0)
     excess = Remark("excess-residuals", "residuals are 2.5 times the declared noise")
@@ -194,12 +177,6 @@ def test_suspects_have_their_odds_and_the_first_three_are_listed():
     assert "suspects" not in lines("suspected", suspects=bound[1:])
 
 
-def test_a_first_suspect_of_little_probability_is_doubted():
-    for probability, words in ((0.1, "first suspect is a"), (0.01, "no effect is likely, the")):
-        suspects = (Suspect(("a",), -3.0, probability),)
-        assert said("suspected", suspects=suspects).startswith(f"Cause not certain: {words}")
-
-
 def test_a_likelier_suspect_of_implausible_size_follows_and_the_line_says_why():
     usual, large = (
         Suspect(("a",), -2.5, 0.07),
@@ -218,22 +195,6 @@ def test_a_likelier_suspect_of_implausible_size_follows_and_the_line_says_why():
         "suspected", **alone
     )
     assert lines("suspected", **alone)["suspects"].startswith("Suspects, the likeliest first,")
-
-
-@pytest.mark.parametrize(
-    "log_odds, words",
-    [
-        (0.09, "even odds"),
-        (-0.09, "even odds"),
-        (0.11, "odds 1.1 to 1"),
-        (-0.11, "odds 1 to 1.1"),
-        (9.2, "odds 9897 to 1"),
-        (9.3, "odds more than 10000 to 1"),
-        (-9.3, "odds 1 to more than 10000"),
-    ],
-)
-def test_odds_in_words(log_odds, words):
-    assert _odds(log_odds).replace("\N{NO-BREAK SPACE}", "") == words
 
 
 def test_explanations_by_what_is_claimed():
@@ -325,8 +286,3 @@ def test_extrapolation_is_not_supported_where_the_gap_is_hardly_reduced(before, 
     region = GapReduction(before, after, {}, 24, "load_N >= 140")
     found = concluded("named", gap=FIGURES | {"held_out_region": region})
     assert remarked(found, "on load_N >= 140 the gap is hardly reduced") == hardly
-
-
-def test_effects_that_cannot_be_tested_are_listed_once():
-    untestable = {"slope": remark("needs tilt"), "rate": remark("needs speeds")}
-    assert concluded("named", untestable=untestable) == concluded("named")

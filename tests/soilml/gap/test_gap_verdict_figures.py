@@ -14,8 +14,6 @@ from soilml.gap.run_options import (
     HIGHEST_SLIP,
     LISTED,
     ROWS_PER_RUN,
-    _usual,
-    _whole,
     check_costs,
     drivable_slips,
     rank_by_cost,
@@ -113,18 +111,3 @@ def test_slips_in_steps_that_a_rig_can_set(low, high, expected):
     found = drivable_slips(low, high)
     assert found.tolist() == expected
     assert found.size <= ROWS_PER_RUN and np.abs(found).max() <= HIGHEST_SLIP
-
-
-@pytest.mark.parametrize(
-    ("load", "expected"), [(124.2, 124.0), (10.4, 10.0), (9.87, 9.9), (0.1234, 0.12), (99.6, 100.0)]
-)
-def test_loads_in_whole_newton_or_two_digits(load, expected):
-    assert _whole(load) == expected
-
-
-def test_covariates_as_most_rows_were_driven():
-    at = stub(speed=np.asarray([-0.1, 0.1, 0.1234]), pass_number=np.asarray([3.0, 1.0, 2.0]),
-              slip_angle=None)  # fmt: skip
-    assert _usual(stub(at=at)) == {"speed": 0.1, "pass_number": 1.0}
-    slow = stub(speed=np.asarray([0.01234]), pass_number=None, slip_angle=np.asarray([0.2, 0.1]))
-    assert _usual(stub(at=slow)) == {"speed": 0.012, "slip_angle": 0.15}

@@ -10,7 +10,6 @@ from gap_sets import MODEL, analysed, case_of, driven, hidden
 
 from soilml.cli import main
 from soilml.config.write_case import case_as_toml
-from soilml.errors import InputError, TableError
 from soilml.gap import gap
 from soilml.physics.effects import EFFECTS
 
@@ -127,28 +126,6 @@ def test_rows_with_another_status_than_ok_are_excluded(dug):
     assert [note["code"] for note in found.pop("notes")] == ["rows-excluded"]
     assert plain.pop("notes") == []
     assert found == plain
-
-
-@pytest.mark.parametrize(
-    "holdout, error, said",
-    [
-        ("mood=3", TableError, "mood"),
-        ("load_N", InputError, "COLUMN=VALUE"),
-        ("load_N=heavy", TableError, "'heavy' is not a number"),
-        ("run=run_9", TableError, "no row has run = run_9"),
-    ],
-)
-def test_unusable_holdouts_are_refused(dug, holdout, error, said):
-    with pytest.raises(error, match=said):
-        gap(*dug, holdout=holdout)
-
-
-def test_too_few_runs_for_a_holdout():
-    case = case_of()
-    with pytest.raises(InputError, match="needs four runs or more; the table has 3"):
-        gap(case, driven(case, loads=(40.0, 60.0, 90.0)), holdout="run")
-    with pytest.raises(InputError, match="holds out every row"):
-        gap(case, driven(case, loads=(60.0, 60.0)), holdout="load_N=60")
 
 
 def test_a_calibrated_sensor_is_not_named():

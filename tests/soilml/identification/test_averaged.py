@@ -11,7 +11,7 @@ from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import FitError
 from soilml.gap import gap
 from soilml.inference.search import Search
-from soilml.physics.effects.friction_drift import FrictionDrift
+from soilml.physics.effects.soil_changes import FrictionDrift
 from soilml.quantities import SHEAR
 
 CASE = read_recipe("wheel").case

@@ -118,25 +118,6 @@ def test_a_share_of_noise_does_not_draw_the_fit_low(case):
     assert abs(np.mean(bias) - 1.0) < 0.006  # 0.1 / sqrt(3000) is 0.002; of readings: -0.02
 
 
-def test_a_std_given_in_the_table_stands(case):
-    table = measured(case, TRUTH, SLIPS, LOADS, noise=0.02)
-    table.columns["torque_Nm_std"] = 0.1 * table["torque_Nm"]
-    assert (
-        identify(case, table, method="nonlinear").std
-        > 1.3
-        * identify(case, measured(case, TRUTH, SLIPS, LOADS, noise=0.02), method="nonlinear").std
-    ).any()
-
-
-def test_a_single_row_leaves_the_prior_and_says_so(case):
-    fit = identify(
-        case, measured(case, TRUTH, SLIPS[:1], LOADS[:1], noise=0.02), method="nonlinear"
-    )
-    assert "1 reading for 3 parameters: the prior determines the rest" in texts(fit.warnings)
-    assert fit.remaining_fraction["cohesion"] > 0.8
-    assert fit.std[0] > 500.0
-
-
 def test_free_parameters_can_be_chosen_and_unknown_ones_are_refused(case):
     table = measured(case, TRUTH, SLIPS, LOADS)
     fit = identify(
@@ -197,13 +178,6 @@ def test_more_misfit_than_noise_is_said_and_widens(case):
     fit = identify(case, table, method="nonlinear")
     assert any("times the declared noise" in said for said in texts(fit.warnings))
     assert fit.misfit > 3.0
-
-
-def test_a_load_that_nothing_carries_is_an_error(case):
-    table = measured(case, TRUTH, SLIPS, LOADS)
-    table.columns["load_N"] = np.full(18, 1e6)
-    with pytest.raises(FitError, match="no parameters in the prior carry"):
-        identify(case, table, method="nonlinear")
 
 
 def test_a_table_of_another_wheel_is_refused(case):

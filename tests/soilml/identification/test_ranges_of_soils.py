@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from soilml import Case, Model, Wheel, soil
-from soilml.identification.bevameter.soil_section import plate_section, shear_section, within_bounds
+from soilml.identification.bevameter.soil_section import plate_section, shear_section
 from soilml.identification.trained_estimator import SAME_PRIOR, narrower_priors
 from soilml.numerics.prior import Prior
 
@@ -101,12 +101,6 @@ def test_plates_of_two_sizes_give_the_range_at_the_width_of_the_gear():
     assert (prior["kphi"].lower, prior["kphi"].upper) == pytest.approx(expected, rel=2e-3)
     assert "kc" not in prior and remarks == []
     assert (prior["n"].lower, prior["n"].upper) == (0.9, 1.1)
-
-
-def test_values_stay_within_the_bounds_of_a_soil():
-    assert within_bounds({"cohesion": -1.0, "n": 1.0}) == {"cohesion": 0.0, "n": 1.0}
-    assert within_bounds({"friction_angle": 9.0})["friction_angle"] < math.pi / 2.0
-    assert within_bounds({"n": 1.0}) == {"n": 1.0}
 
 
 @pytest.mark.parametrize(

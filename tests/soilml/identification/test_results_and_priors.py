@@ -113,17 +113,6 @@ def test_a_parameter_that_is_held_fixed_widens_the_others_by_its_prior(case):
     np.testing.assert_allclose(part.covariance[0, 0], 1.0 + 0.5 * below**2, rtol=1e-9)
 
 
-@pytest.mark.parametrize(("misfit", "said"), [(3.9, False), (4.1, True), (float("nan"), False)])
-def test_a_closed_form_says_where_it_does_not_hold(case, misfit, said):
-    prior = {"cohesion": Prior(0.0, 9.0), "friction_angle": Prior(0.5, 0.6)}
-    fit = fit_of(misfit=misfit)
-    fixed = with_fixed_parameter(replace(case, prior=prior), "n", lambda _: fit)
-    found = texts(fixed.warnings)[2:]
-    assert found[0] == "cohesion is 10, outside its prior of 0 to 9: do not use it"
-    assert any(t.startswith("residuals are 2.0 times the declared noise") for t in found) == said
-    assert len(found) == 1 + said
-
-
 def test_noise_alone_exceeds_the_limit_of_the_misfit_once_in_a_thousand():
     from scipy.stats import chi2
 

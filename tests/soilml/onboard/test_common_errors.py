@@ -1,5 +1,7 @@
 """Errors that all rows of a set share, of the sensors and of the model."""
 
+import json
+
 import numpy as np
 import pytest
 from conftest import simulated_run
@@ -11,6 +13,7 @@ from soilml.onboard.set_contract import (
     INFERRED,
     MODEL_ERROR_INPUT,
 )
+from soilml.onboard.set_posterior import SetPosterior
 from soilml.physics.operating_point import Operating
 
 #: Sensors without errors that all readings share.
@@ -102,3 +105,16 @@ def test_a_stream_has_the_errors_of_its_model(estimator, wheel_posterior):
     assert found.std == pytest.approx(together.std, rel=0.25)
     with pytest.raises(InputError, match="this memory is of"):
         estimator.step(memory, **run)
+
+
+@pytest.mark.parametrize(
+    ("lacking", "columns"),
+    [({"model_errors"}, 6), ({"errors", "model_errors", "least_share_in_range", "misfit"}, 1)],
+)
+def test_files_of_earlier_interfaces_know_fewer_errors(estimator, lacking, columns):
+    metadata = json.loads(estimator.metadata["set"])
+    metadata["errors"].pop("model_error")
+    former = SetPosterior.of({k: v for k, v in metadata.items() if k not in lacking})
+    assert former.columns == former.terms + columns
+    with pytest.raises(InputError, match="of an earlier version takes it as zero: train it again"):
+        former.with_context({"model_error": 1.0}, {})

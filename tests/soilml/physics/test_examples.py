@@ -7,7 +7,7 @@ import pytest
 
 MODULES = (
     "soilml.physics.effects.base",
-    "soilml.physics.effects.slip_sinkage",
+    "soilml.physics.effects.soil_changes",
     "soilml.physics.gears.wheel",
     "soilml.physics.model",
     "soilml.physics.operating_point",

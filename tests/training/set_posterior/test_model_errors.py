@@ -13,7 +13,7 @@ from soilml.onboard.set_contract import (
     MEMORY_INPUTS,
     MODEL_ERROR_COLUMNS,
 )
-from soilml.physics.effects.exit_angle import ExitAngle
+from soilml.physics.effects.contact_shape import ExitAngle
 from soilml.quantities import SHEAR
 from training.onnx_graph.builder import Graph, session_of
 from training.onnx_graph.value import Value, constant

@@ -13,7 +13,7 @@ from soilml.arrays import Floats
 from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, USUAL_SENSOR_ERRORS, without_errors
 from soilml.onboard.set_contract import INFERRED, LEAST_STD
 from soilml.physics.effects.base import Effect
-from soilml.physics.effects.exit_angle import ExitAngle
+from soilml.physics.effects.contact_shape import ExitAngle
 from soilml.physics.model import Model
 from training.onnx_graph.value import Value, log, maximum, minimum
 from training.set_posterior.families.coordinates import PriorAxis

@@ -11,7 +11,7 @@ import pytest
 
 from soilml import EFFECTS, LinearWheel, Model, Operating, Wheel, soil
 from soilml.physics.contact import Contact, Stress, stress
-from soilml.physics.effects.sidewall_shear import buried
+from soilml.physics.effects.forces_beside import buried
 from soilml.physics.forces import forces_at_sinkage
 from soilml.physics.load_case import LoadCase
 
