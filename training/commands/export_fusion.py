@@ -25,7 +25,8 @@ their errors, which are in the files. docs/how-to/deploy.md describes it.
 
 
 ARGUMENTS = (
-    ("model MODEL.onnx", "two files, named as their C files", InputFile, {"nargs": 2}),
+    ("first FIRST.onnx", "a file, named as its C file", InputFile),
+    ("second SECOND.onnx", "the other one", InputFile),
     ("out OUT.c", "C file to write; OUT.h is written beside it"),
 )
 
@@ -45,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.onboard.model_file import find_model
     from training.export_c.fusion import write_fusion
 
-    out, files = Path(args.out), [find_model(model) for model in args.model]
+    out, files = Path(args.out), [find_model(model) for model in (args.first, args.second)]
     for name in (out, *(file.with_suffix(".c") for file in files)):
         check_c_name(name)
     estimators = [Estimator.load(file) for file in files]
