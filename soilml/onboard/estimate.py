@@ -286,7 +286,7 @@ class Estimate(Result):
         >>> wide = estimator.run(slip=[0.1, 0.3], torque=[1.6, 2.7], load=[60.0, 60.0])
         >>> narrow = wide.within(cohesion=(200.0, 800.0))
         >>> print(f"{wide['cohesion'][1]:.0f} Pa, {narrow['cohesion'][1]:.0f} Pa")
-        704 Pa, 181 Pa
+        720 Pa, 173 Pa
         """
         lower, upper = box_ends(self.names, self.units, (self.prior.lower, self.prior.upper), box)
         prior = PriorSummary(0.5 * (lower + upper), (upper - lower) / math.sqrt(12.0), lower, upper)

@@ -7,7 +7,12 @@ import pytest
 
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.multi_sensor import fuse_estimates
-from soilml.onboard.set_contract import ABSENT_READING, ABSENT_STD
+from soilml.onboard.set_contract import (
+    ABSENT_READING,
+    ABSENT_STD,
+    COMMON_ERROR_INPUTS,
+    ERROR_COLUMNS,
+)
 from soilml.onboard.set_posterior import SetPosterior, constant_noise_factor
 
 SETS = SetPosterior(
@@ -16,7 +21,8 @@ SETS = SetPosterior(
     context_ranges={},
     context_values={},
     sets_only=True,
-    common_errors={},
+    common_errors=dict.fromkeys(COMMON_ERROR_INPUTS, 0.0),
+    error_columns=len(ERROR_COLUMNS),
     least_share_in_range=0.5,
 )
 ROWS = {"slip": np.asarray([0.1, 0.2]), "torque": np.asarray([10.0, -5.0]), "load": 60.0}
