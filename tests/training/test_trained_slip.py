@@ -96,8 +96,8 @@ def test_the_command_fuses_files_and_goes_on_without_a_channel(trained, tmp_path
     log = tmp_path / "log.csv"
     log.write_text("run,load_N,torque_Nm,drawbar_pull_N\na,60,3.2,8\na,60,3.2,\na,60,,8\na,60,,\n")
     command = ["estimate", first, str(log), "--with", second, "--out", str(tmp_path / "o.csv")]
-    assert main(command) == 0
-    said = capsys.readouterr().err
+    assert main([*command, "-v"]) == 0
+    said = capsys.readouterr().out
     assert "1 rows lack a reading" in said and "fused by the rule correlated" in said
     found = [line.split(",") for line in (tmp_path / "o.csv").read_text().splitlines()]
     assert found[0][4:] == ["slip", "slip_std", "slip_p05", "slip_p95", "in_range", "files"]
