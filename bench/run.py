@@ -26,6 +26,7 @@ MODULES = (
     "gap_bench",
     "gap_pull",
     "gap_speed",
+    "challenge",
 )
 
 if __name__ == "__main__":
