@@ -44,7 +44,7 @@ def report_of_import(found: ImportedLog) -> Report:
         pictures=[*_pictures(found)],
         remarks=odd[1:],
         next_steps=[step],
-        details=[("[bias] for the model file", found.bias_toml().splitlines())],
+        details=[("[bias] for the model file", [found.bias_toml()])],
         status=f"{rows} row{'s'[: rows != 1]}",
         tone=tone,
         title=f"Import report: {found.map_name}",

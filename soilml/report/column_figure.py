@@ -84,12 +84,16 @@ def _draw(
                 _line(panel, columns, x, name, rows, colour, _STYLES[j * bool(said) % 4], label)
         for j, name in enumerate(names):
             if name in measured:
-                panel.plot(*_shown(measured, x, name), "o", color=COLOURS[1], ms=4, mfc="none")
+                panel.plot(
+                    *_shown(measured, x, name), "o", color=COLOURS[1], ms=4, mfc="none",
+                    label="measured", zorder=3,
+                )  # fmt: skip
             if len(names) > 1 and groups[0][0]:
                 panel.plot([], [], color=UNCHANGED, ls=_STYLES[j % 4], label=_words(name))
         panel.set_xlabel(pretty(shown_column(x)[1]))
         panel.set_ylabel(_shared_label([pretty(shown_column(name)[1]) for name in names]))
-        if len(names) > 1 or (k == 0 and lines):
+        labels = panel.get_legend_handles_labels()[1]
+        if len(names) > 1 or (k == 0 and (lines or len(labels) > 1)):
             panel.legend()
 
 
@@ -109,7 +113,8 @@ def _line(
         ends = [columns.get(f"{name}{ending}{end}") for end in ("_p05", "_p95")]
         if all(end is not None for end in ends):
             low, high = (shown_column(name)[0] * np.asarray(end, float)[at] for end in ends)
-            panel.fill_between(places, low, high, color=shade, alpha=alpha, lw=0)
+            said = "90 %, prior" if ending and not rows[0] else ""
+            panel.fill_between(places, low, high, color=shade, alpha=alpha, lw=0, label=said)
     std = columns.get(f"{name}_std")
     errors = None if std is None else shown_column(name)[0] * np.asarray(std, float)[at]
     marker = "o" if at.size <= _FEW else ""

@@ -107,7 +107,8 @@ def page_content(report: Report) -> dict[str, Any]:
         "tables": tables,
         "remarks": [_said(remark.text) for remark in report.remarks],
         "details": [
-            [_said(head), [_said(text) for text in texts]] for head, texts in report.details
+            [_said(head), [t if "\n" in t else _said(t) for t in texts]]
+            for head, texts in report.details
         ],
         "notation": [[pretty(term), pretty(text)] for term, text in report.notation],
     }

@@ -71,7 +71,8 @@ class Report:
     tables, pictures: Further ones, the first of which matter most.
     remarks: What limits the answer.
     next_steps: What to do, the first step first.
-    details: Lists of sentences under headings, for readers who want all.
+    details: Lists of sentences under headings, for readers who want all; a text of several lines
+        is a part of a file, which a page shows as it is.
     status: The answer in a word or two, and its `tone`: good, warn, bad or plain.
     title: What was asked.
     basis: What the answer was made from.

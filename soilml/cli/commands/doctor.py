@@ -28,14 +28,14 @@ USES = {
     "mcap": "import of MCAP",
     "rosbags": "import of ROS bags",
     "matplotlib": "pictures",
-    "jinja2": "report of gap; export-c",
-    "onnx": "train, export-c",
+    "jinja2": "report of gap; export c",
+    "onnx": "train, export c",
     "torch": "generate --device; gradients of the forward model",
     "scikit-learn": "train",
     "array-api-compat": "the forward model on torch tensors",
     "shtab": "completion",
     "tornado": "serve",
-    "tifffile": "map",
+    "tifffile": "drive map",
     "threadpoolctl": "gap, generate, train",
 }
 NEEDED = ("numpy", "onnxruntime")  # The libraries without which nothing works

@@ -142,6 +142,13 @@ def test_a_page_is_self_contained_follows_dark_mode_and_escapes_all_text():
     assert html == page(evil, ORIGIN)
 
 
+def test_a_page_shows_parts_of_files_as_they_are():
+    pytest.importorskip("matplotlib")
+    whole = report(details=[("For the file", ["[bias]\nslip = -0.01\n"]), ("More", ["slip is -1"])])
+    html = page(whole, ORIGIN)
+    assert "<pre>[bias]\nslip = -0.01\n</pre>" in html and "<li>Slip is −1</li>" in html
+
+
 def test_groups_of_rows_are_one_report():
     both = by_group({"a": report(), "b": report()}, {"c": "too few rows"}, "run", "2 results.", "t")
     heads, rows, _ = both.tables[0].cells()

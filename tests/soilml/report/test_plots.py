@@ -119,3 +119,17 @@ def test_results_draw_themselves(make, shape, said, case):
     assert not pyplot.get_fignums()
     with pytest.raises(InputError, match="this plot needs"):
         result.plot(ax=Figure().subplots(5, 1))
+
+
+def test_a_picture_of_columns_names_its_bands_and_points():
+    from soilml.report.column_figure import column_picture
+
+    pull = np.asarray([1.0, 2.0])
+    ends = {"drawbar_pull_N_prior_p05": pull - 1, "drawbar_pull_N_prior_p95": pull + 1}
+    columns = {"slip": np.asarray([0.1, 0.2]), "drawbar_pull_N": pull, **ends}
+    figure = matplotlib.figure.Figure()
+    axes = figure.subplots(1, 1, squeeze=False)
+    picture = column_picture(columns, "slip", [("drawbar_pull_N",)], measured=columns)
+    picture.draw(axes)
+    named = {text.get_text() for text in axes[0, 0].get_legend().get_texts()}
+    assert {"90 %, prior", "measured"} <= named
