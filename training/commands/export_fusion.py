@@ -13,7 +13,7 @@ from training.export_c.c_names import check_c_name
 DESCRIPTION = """\
 Write the fusion of two files that estimate the same quantity from different
 sensors, such as slip from torque and from vibration, as the C file OUT.c and
-its header OUT.h. They use the structs that export-c writes for each file.
+its header OUT.h. They use the structs that export c writes for each file.
 
   soilml export c exported/slip_torque.onnx slip_torque.c
   soilml export c exported/slip_vibration.onnx slip_vibration.c

@@ -1,1 +1,1 @@
-"""Export of trained models: ONNX file, model card and learning curves."""
+"""Export of trained models: ONNX file and model card."""

@@ -25,7 +25,7 @@ def kind_of(element_type: int, name: str) -> str:
     """The C type of an ONNX element type; raises `ModelFileError` for another."""
     if element_type not in KINDS:
         raise ModelFileError(
-            f"tensor {name} has ONNX element type {element_type}; export-c knows float32, "
+            f"tensor {name} has ONNX element type {element_type}; export c knows float32, "
             "float64, int32, int64 and bool"
         )
     return KINDS[element_type]
@@ -103,4 +103,4 @@ class Tensor:
         """Elements of a constant of whole numbers; raises `ModelFileError` for another tensor."""
         if self.value is not None:
             return [int(x) for x in self.value.reshape(-1)]
-        raise ModelFileError(f"{what} depends on the readings; export-c needs it to be constant")
+        raise ModelFileError(f"{what} depends on the readings; export c needs it to be constant")

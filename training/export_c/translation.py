@@ -42,7 +42,7 @@ def flat_nodes(graph: Any, known: dict[str, Tensor]) -> list[Any]:
         condition = known.get(node.input[0])
         if condition is None or condition.value is None:
             raise ModelFileError(
-                "operator If whose condition depends on the readings is not known to export-c"
+                "operator If whose condition depends on the readings is not known to export c"
             )
         return "then_branch" if condition.value.all() else "else_branch"
 
@@ -90,7 +90,7 @@ def _translated(program: Program, node: Any, inputs: list[Tensor | None]) -> lis
     if node.op_type == "Constant" or (node.op_type in OPERATORS and constant and not node.domain):
         return _computed_now(node, inputs)
     if node.op_type not in OPERATORS:
-        raise ModelFileError(f"operator {node.op_type} is not known to export-c")
+        raise ModelFileError(f"operator {node.op_type} is not known to export c")
     attributes = {a.name: helper.get_attribute_value(a) for a in node.attribute}
     if "value" in attributes:
         attributes["value"] = numpy_helper.to_array(attributes["value"])

@@ -48,7 +48,7 @@ def slip_files(
     """
     rover = case.rover
     if rover is None:
-        raise InputError("the model file has no [rover]; export-slip needs mass and wheels")
+        raise InputError("the model file has no [rover]; export slip needs mass and wheels")
     load = rover.loads(np.deg2rad(np.linspace(-steepest, steepest, 21)))
     table = force_table(case, (float(load.min()), float(load.max())), soils)
     own = case.noise.get("torque_Nm")

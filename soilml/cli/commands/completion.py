@@ -73,7 +73,6 @@ def _names(command: str, dest: str, metavar: str) -> Iterable[str]:
     from soilml.config.wheeled_rover import GRAVITY
     from soilml.identification import METHODS
     from soilml.onboard.model_file import released_models
-    from soilml.onboard.multi_sensor import ACROSS_FILES
     from soilml.physics.effects import EFFECTS
     from soilml.physics.soils import soil_catalogue
     from soilml.physics.soils.gravity_law import LAWS
@@ -88,7 +87,6 @@ def _names(command: str, dest: str, metavar: str) -> Iterable[str]:
         "gravity_law": LAWS,
         "gravity": GRAVITY,
         "tested_at": GRAVITY,
-        "rule": ACROSS_FILES,
         "by": ("run", "gear"),
     }
     return known.get(dest) or known.get(f"{command} {dest}", ())

@@ -46,5 +46,5 @@ def test_an_operator_that_is_not_known_is_named():
     metadata = {entry.key: entry.value for entry in model.metadata_props}
     node = next(n for n in model.graph.node if n.op_type == "Abs")
     node.op_type = "Sign"
-    with pytest.raises(ModelFileError, match="operator Sign is not known to export-c"):
+    with pytest.raises(ModelFileError, match="operator Sign is not known to export c"):
         write_c(model, metadata, "linear", "linear.onnx")

@@ -1,4 +1,4 @@
-"""Every operator that export-c knows: the compiled C against onnxruntime."""
+"""Every operator that export c knows: the compiled C against onnxruntime."""
 
 import ctypes
 import subprocess

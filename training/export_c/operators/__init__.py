@@ -1,4 +1,4 @@
-"""ONNX operators as C: every operator that export-c knows, by its name."""
+"""ONNX operators as C: every operator that export c knows, by its name."""
 
 from __future__ import annotations
 

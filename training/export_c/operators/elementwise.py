@@ -35,7 +35,7 @@ def translate_function(program: Program, node: Node) -> list[Tensor]:
     """A function of the C library; of many hyperbolic tangents in float, one of our own."""
     x = node.input(0)
     if x.kind not in REAL:
-        raise ModelFileError(f"operator {node.kind} of {x.kind} numbers is not known to export-c")
+        raise ModelFileError(f"operator {node.kind} of {x.kind} numbers is not known to export c")
     if node.kind == "Tanh" and x.kind == "float":
         x = program.stored(x)
         out = program.new(x.kind, x.shape)

@@ -45,7 +45,7 @@ def translate_slice(program: Program, node: Node) -> list[Tensor]:
     starts, ends = node.numbers(1, "starts") or [], node.numbers(2, "ends") or []
     axes = node.numbers(3, "axes") or list(range(len(starts)))
     if any(step != 1 for step in node.numbers(4, "steps") or []):
-        raise ModelFileError("operator Slice with steps is not known to export-c")
+        raise ModelFileError("operator Slice with steps is not known to export c")
     for axis, start, end in zip(axes, starts, ends, strict=True):
         chosen = range(x.shape[axis])[start:end]
         x = _slice(program, x, axis % x.rank, chosen.start, len(chosen))
