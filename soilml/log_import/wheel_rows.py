@@ -110,7 +110,10 @@ class WheelRows:
         """Hints at what is `wrong`, or merely odd, in rows of runs."""
         values = by_name([row.values for own in rows for row in own])
         radius = self.wheel.radius.value if self.wheel.radius is not None else None
-        for hint in RowsToCheck(values, radius, self.wheel, self.log_map.vehicle).hints():
+        weight = None
+        if (vehicle := self.log_map.vehicle) is not None:
+            weight = (vehicle.mass.value * vehicle.gravity / vehicle.wheels,) * 2
+        for hint in RowsToCheck(values, radius, self.wheel, weight).hints():
             if hint.wrong == wrong:
                 yield Remark(hint.code, f"{self.log_map.source}{self.of}: {hint.text}", hint.about)
 

@@ -175,7 +175,11 @@ def _put_gear_ratio(
 
 
 def draft_channels(
-    chosen: dict[str, Candidate], run: Run, stated: Stated, parts: Mapping[str, Sequence[Candidate]]
+    chosen: dict[str, Candidate],
+    run: Run,
+    steady: bool,
+    stated: Stated,
+    parts: Mapping[str, Sequence[Candidate]],
 ) -> dict[str, Draft]:
     """Tables of the channels of one wheel, with units, signs and tares as the samples show them.
 
@@ -187,7 +191,7 @@ def draft_channels(
     if rotation and ground and rotation.keys.get("unit") == "rad/s" and not rotation.column.unit:
         size = {"mm/s": 1e-3, "cm/s": 1e-2}.get(ground.keys["unit"], 1.0) * ground.column.about.size
         rotation.put("unit", *guess_rotation_unit(rotation.column.about.size, size, radius))
-    if (inputs := inputs_of(drafts, run)) is not None:
+    if (inputs := inputs_of(drafts, run, steady)) is not None:
         signs(drafts, inputs)
         tares(drafts, inputs)
         far_sinkage(drafts, inputs, radius)

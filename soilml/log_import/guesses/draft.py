@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,7 +12,7 @@ from soilml.arrays import Floats
 from soilml.errors import SoilmlError
 from soilml.io.declared_settings import take_declared
 from soilml.io.toml_settings import Settings
-from soilml.log_import.channels.inputs import Inputs, moving, wheel_inputs
+from soilml.log_import.channels.inputs import Inputs, combined, moving, wheel_inputs
 from soilml.log_import.channels.resampling import on_grid
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import Candidate
@@ -38,12 +38,26 @@ class Draft(WrittenTable):
         return Draft(path, kept, self.comments, after=after, column=self.column)
 
 
-def inputs_of(drafts: dict[str, Draft], run: Run) -> Inputs | None:
-    """The samples as drafts read them, of a radius of 1 m; None where these do not fit the run."""
+def wheel_of(drafts: Mapping[str, Draft], radius: float | None) -> WheelMap:
+    """The wheel of drafts; raises `InputError` for keys that do not go together."""
+    tables = {role: Settings(dict(draft.keys), f"[{role}]") for role, draft in drafts.items()}
+    channels = {r: take_declared(ChannelMap, own, r, role=r) for r, own in tables.items()}
+    return WheelMap("", None if radius is None else Uncertain(radius), channels)
+
+
+def inputs_of(drafts: Mapping[str, Draft], run: Run, steady: bool) -> Inputs | None:
+    """The samples as drafts read them; None where these do not fit the run.
+
+    Of a table whose rows are `steady` runs, each row is a sample.
+    """
     try:
-        tables = {role: Settings(dict(draft.keys), f"[{role}]") for role, draft in drafts.items()}
-        channels = {r: take_declared(ChannelMap, own, r, role=r) for r, own in tables.items()}
-        return wheel_inputs(run, WheelMap("", Uncertain(1.0), channels))
+        wheel = wheel_of(drafts, 1.0)
+        if not steady:
+            return wheel_inputs(run, wheel)
+        time: Floats = np.arange(max(2.0, len(run.recordings[0])))
+        columns = {r: [run.find(a)[1] for a in c.columns] for r, c in wheel.channels.items()}
+        values = {r: combined(wheel.channels[r], own) for r, own in columns.items()}
+        return Inputs(time, values) if len(run.recordings[0]) > 1 else None
     except SoilmlError:
         return None
 
@@ -57,7 +71,7 @@ def driving_means(inputs: Inputs, seconds: float = 1.0) -> dict[str, Floats]:
     return {role: own for role, own in means.items() if np.isfinite(own).any()}
 
 
-def travel_over_rotation(means: dict[str, Floats]) -> Floats:
+def travel_over_rotation(means: Mapping[str, Floats]) -> Floats:
     """Travel (m/s) over rotation (rad/s, or rim speed), without sign (blocks,); empty for none."""
     rotation = means.get("rim_speed", means.get("wheel_speed"))
     if rotation is None or "ground_speed" not in means:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from soilml.log_import.channels.runs import matched_files, run_names, runs_of
@@ -133,15 +133,16 @@ class MapGuess:
             return tuple(replace(kind, clock="start") for kind in named)
         return tuple(named)
 
-    def map(self, doubts: Mapping[str, str] | None = None) -> WrittenMap:
-        """The whole map, with a mark on the channels that its own rows put in doubt, by role."""
+    def map(self) -> WrittenMap:
+        """The whole map, with a mark on the channels that lack evidence."""
         stated, shared, wheels = self.stated.common, self.found.shared, self.found.wheels
-        constants, explained = self._constants(), []
+        radius, weight, explained = stated_radius(stated), self._weight(), []
         drafts: dict[str, dict[str, Draft]] = {}
         for name, own in (wheels or {"": {}}).items():
-            group = draft_channels(shared | own, self.run, stated, self.found.parts)
-            evidence = weigh(group, inputs_of(group, self.run), constants, self.found.others,
-                             self.usable, self.reasons, doubts or {})  # fmt: skip
+            steady = self.steady > 0
+            group = draft_channels(shared | own, self.run, steady, stated, self.found.parts)
+            evidence = weigh(group, inputs_of(group, self.run, steady), radius, weight,
+                             self.found.others, self.usable, self.reasons, not steady)  # fmt: skip
             explained += [f"wheel {name}\n" if name else "", *map(str, evidence)]
             for role, draft in group.items():
                 if others := [c.address for c in self.found.others.get(role, [])[:4]]:
@@ -181,18 +182,16 @@ class MapGuess:
                 tables.append(draft.only(f"wheels.{name}.{role}", left))
         return WrittenMap(self._head(), [*tables, *(() if self.steady else self._window_tables())])
 
-    def _constants(self) -> dict[str, float]:
-        """Radius (m) and weight on each wheel (N), as far as the logs state them."""
-        stated, found = self.stated.common, {}
-        if radius := stated_radius(stated):
-            found["radius"] = radius
-        if "mass" in stated:
-            count = int(stated.get("wheels", (str(max(1, len(self.found.wheels))), ""))[0])
-            mass, _, unit = stated["mass"][0].partition(" ")
-            found["weight"] = 9.80665 * float(mass) * factor(unit or "kg", "kg", "mass") / count
-            known = "wheels" in stated or len(self.found.wheels) > 1
-            found["least_weight"] = found["weight"] / (1 if known else _MOST_WHEELS)
-        return found
+    def _weight(self) -> tuple[float, float] | None:
+        """Least and largest weight on each wheel by the stated mass, N; None without one."""
+        stated = self.stated.common
+        if "mass" not in stated:
+            return None
+        count = int(stated.get("wheels", (str(max(1, len(self.found.wheels))), ""))[0])
+        mass, _, unit = stated["mass"][0].partition(" ")
+        weight = 9.80665 * float(mass) * factor(unit or "kg", "kg", "mass") / count
+        known = "wheels" in stated or len(self.found.wheels) > 1
+        return weight / (1 if known else _MOST_WHEELS), weight
 
     def _head(self) -> list[str]:
         names = run_names([log[0].file for log in self.logs])
@@ -275,7 +274,7 @@ class MapGuess:
         roles = self.found.roles()
         turning = {"wheel_speed", "wheel_angle"} & roles
         needed = bool(turning) and not {"slip", "rim_speed"} & roles
-        inputs = inputs_of(drafts, self.run) if turning else None
+        inputs = inputs_of(drafts, self.run, self.steady > 0) if turning else None
         # where rotation is of the motor
         gear = math.prod(float(drafts[role].keys.get("gear_ratio", 1.0)) for role in turning)
         slips = [*self.found.others.get("slip", [])]
