@@ -12,8 +12,9 @@ from soilml.config.measurement_noise import Noise
 from soilml.log_import.channels.inputs import Inputs, wheel_inputs
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.channels.wheel_quantities import Conversion, SharedError
+from soilml.log_import.checks.checked_rows import RowsToCheck
 from soilml.log_import.checks.columns import differing_units, unit_hints, with_shared_errors
-from soilml.log_import.checks.row_hints import RowsToCheck
+from soilml.log_import.checks.row_hints import hints_of
 from soilml.log_import.checks.sensors import dead_sensors, drop_clipped, untared_sensors
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.rows import (
@@ -113,7 +114,7 @@ class WheelRows:
         weight = None
         if (vehicle := self.log_map.vehicle) is not None:
             weight = (vehicle.mass.value * vehicle.gravity / vehicle.wheels,) * 2
-        for hint in RowsToCheck(values, radius, self.wheel, weight).hints():
+        for hint in hints_of(RowsToCheck(values, radius, self.wheel, weight)):
             if hint.wrong == wrong:
                 yield Remark(hint.code, f"{self.log_map.source}{self.of}: {hint.text}", hint.about)
 

@@ -16,7 +16,8 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.table import Table
-from soilml.log_import.checks.row_hints import RowsToCheck
+from soilml.log_import.checks.checked_rows import RowsToCheck
+from soilml.log_import.checks.row_hints import hints_of
 from soilml.log_import.checks.slip_definition import other_definition_fits
 from soilml.quantities import COLUMNS, QUANTITIES
 from soilml.remarks import Remark
@@ -41,7 +42,7 @@ def table_hints(columns: Mapping[str, Floats], radius: Floats | float | None) ->
     rows = {COLUMNS[n].name: v for n, v in columns.items() if n in COLUMNS and v.dtype.kind == "f"}
     return [
         Remark(hint.code, hint.text, tuple(QUANTITIES[name].column for name in hint.about))
-        for hint in RowsToCheck(rows, radius).hints()
+        for hint in hints_of(RowsToCheck(rows, radius))
     ]
 
 

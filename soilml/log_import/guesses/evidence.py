@@ -15,7 +15,9 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.log_import.channels.inputs import Inputs
 from soilml.log_import.channels.wheel_quantities import Conversion
-from soilml.log_import.checks.row_hints import FASTEST, TRACTION, RowsToCheck, other_units
+from soilml.log_import.checks.checked_rows import RowsToCheck, other_units
+from soilml.log_import.checks.row_hints import TRACTION, hints_of
+from soilml.log_import.checks.slip_hints import FASTEST
 from soilml.log_import.guesses.columns import Candidate, says_role, wheel_word
 from soilml.log_import.guesses.draft import Draft, driving_means, travel_over_rotation, wheel_of
 from soilml.log_import.mapping.channel_map import ROTATIONS, TRAVELS, UNITS
@@ -160,7 +162,7 @@ def _doubts(
     of_wheel = radius or (implied if _RADII[0] < implied < _RADII[1] else 0.0)
     wheel = wheel_of(drafts, radius or implied or None)
     rows = Conversion(wheel, None).of(means)
-    for hint in RowsToCheck(rows, of_wheel or None, wheel, weight).hints():
+    for hint in hints_of(RowsToCheck(rows, of_wheel or None, wheel, weight)):
         roles = [role for role in hint.about if role in drafts]
         if hint.code not in _OF_NO_MAP:
             yield roles, hint.text

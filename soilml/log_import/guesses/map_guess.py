@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 
+from soilml.io.toml_text import toml_key
 from soilml.log_import.channels.runs import matched_files, run_names, runs_of
 from soilml.log_import.guesses.absent_channels import AbsentChannels
 from soilml.log_import.guesses.channel_drafts import add_errors, draft_channels, is_error
@@ -37,7 +37,7 @@ from soilml.log_import.guesses.forces import by_behaviour
 from soilml.log_import.guesses.roles import assign, axle_of
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap, RunsMap, TimeMap
-from soilml.log_import.mapping.written_map import Marked, WrittenMap, WrittenTable, toml_value
+from soilml.log_import.mapping.written_map import Marked, WrittenMap, WrittenTable
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
 
@@ -254,8 +254,7 @@ class MapGuess:
             wheel.put("gear_from", pattern, why)
             tables = [wheel]
             for name, (key, value) in gears.items():
-                plain = re.fullmatch(r"[A-Za-z0-9_-]+", name)
-                table = WrittenTable(f"gears.{name if plain else toml_value(name)}")
+                table = WrittenTable(f"gears.{toml_key(name)}")
                 table.put(key, f"{value} +- 1 %", "by the names")
                 tables.append(table)
             return tables
