@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from soilml.log_import.checks.columns import differing_units, unit_hints, with_s
 from soilml.log_import.checks.row_hints import hints_of
 from soilml.log_import.checks.sensors import dead_sensors, drop_clipped, untared_sensors
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
+from soilml.log_import.readers import Progress
 from soilml.log_import.rows import (
     WheelSeries,
     WindowRow,
@@ -31,8 +32,6 @@ from soilml.log_import.rows import (
 from soilml.log_import.stance_rows import stance_rows, without_rolling
 from soilml.log_import.windows.steady import Stretch, steady_windows
 from soilml.remarks import Remark
-
-Progress = Callable[[str, int, int], None]
 
 
 class WheelRows:

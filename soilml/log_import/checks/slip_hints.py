@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.log_import.channels.inputs import our_slip
+from soilml.log_import.channels.wheel_quantities import slip_ratio
 from soilml.log_import.checks.checked_rows import Hint, RowsToCheck
-from soilml.log_import.checks.slip_definition import definition_by_speeds
-from soilml.log_import.mapping.channel_map import ROTATIONS, TRAVELS
+from soilml.log_import.mapping.channel_map import ROTATIONS, SLIP_DEFINITIONS, TRAVELS
 
 _OTHER_RADIUS = 0.15  # Largest slip that odometry with another radius gives
 _NO_SLIP = 1e-6  # Slip of rows whose travel and rotation are one measurement
@@ -23,6 +24,10 @@ _MOVES, _FEWEST, _ODOMETRY, _RESOLUTION = 0.2, 3, 0.03, 1e-3
 _ALIKE, _WORKS = 0.01, 1.4
 _OURS = "1 - v/(r omega)"
 _COMPUTED = "was the travel computed from the rotation of the wheel?"
+#: Fewest rows that tell, and the least difference of slip that is worth telling.
+_FEWEST_ROWS, _LEAST = 4, 0.02
+#: Another definition must fit the speeds so many times better than the stated one.
+_BETTER = 2.0
 
 
 def rates_hints(rows: RowsToCheck) -> Iterator[Hint]:
@@ -223,3 +228,40 @@ def _slip_without_cause(ratio: Floats, effort: Floats) -> bool:
     low, high = (float(x) for x in np.percentile(np.abs(effort[good]), [5, 95]))
     own = np.abs(ratio[good])
     return high > _WORKS * low and float(np.std(own)) < _ALIKE / 2.0 * float(np.median(own))
+
+
+def definition_by_speeds(
+    slip: Floats, rim: Floats, travel: Floats, stated: str = SLIP_DEFINITIONS[0]
+) -> tuple[str, str] | None:
+    """Definition and unit ("" or "%") by which slip agrees with the speeds; None for the stated.
+
+    slip: As 1 - v/(r omega), (rows,), where it was defined as `stated`.
+    rim, travel: Speeds (rows,), m/s, in the sensors' own direction.
+
+    The distance of a definition from the speeds is the median over the rows of the difference of
+    slip. It replaces the stated one where that is `_LEAST` or more off, and `_BETTER` times as far.
+    """
+    direction = np.where(rim < 0.0, -1.0, 1.0)
+    by_speeds = slip_ratio(direction * rim, direction * travel)
+    good = np.isfinite(slip) & np.isfinite(by_speeds) & (np.abs(by_speeds) < 1.0)
+    if good.sum() < _FEWEST_ROWS:
+        return None
+    given = _as_logged(slip[good], stated)
+    distance = {
+        (name, unit): float(np.median(np.abs(our_slip(scale * given, name) - by_speeds[good])))
+        for name in SLIP_DEFINITIONS
+        for unit, scale in (("", 1.0), ("%", 0.01))
+    }
+    best = min(distance, key=lambda key: distance[key])
+    off = distance[stated, ""]
+    return best if off > _LEAST and off > _BETTER * distance[best] else None
+
+
+def _as_logged(slip: Floats, definition: str) -> Floats:
+    """The inverse of `our_slip`."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if definition == SLIP_DEFINITIONS[1]:
+            return np.where(slip >= 0.0, 1.0 - slip, 1.0 / (1.0 + slip))
+        if definition == SLIP_DEFINITIONS[2]:
+            return np.where(slip > 0.0, slip / (1.0 - slip), slip)
+    return slip

@@ -10,10 +10,9 @@ import numpy as np
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import CALIBRATED, Candidate, name_scores, says, words_of
 from soilml.log_import.guesses.constants import Stated, stated_radius
-from soilml.log_import.guesses.draft import Draft, inputs_of
+from soilml.log_import.guesses.draft import Draft, far_sinkage, inputs_of, lifted, signs, tares
 from soilml.log_import.guesses.evidence import BY_NAME, LEAST_PERCENT, MOST_FRACTION
 from soilml.log_import.guesses.roles import Assignment
-from soilml.log_import.guesses.signs_and_tares import far_sinkage, lifted, signs, tares
 from soilml.log_import.mapping.channel_map import GEARED, ROLES
 from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import dimension, is_raw_signal

@@ -1,10 +1,11 @@
-"""A guess of the map of logs that nobody has described: each entry with its reason."""
+"""A guess of the map of logs that nobody has described: `soilml import --init`."""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from soilml.io.toml_text import toml_key
 from soilml.log_import.channels.runs import matched_files, run_names, runs_of
@@ -38,6 +39,8 @@ from soilml.log_import.guesses.roles import assign, axle_of
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap, RunsMap, TimeMap
 from soilml.log_import.mapping.written_map import Marked, WrittenMap, WrittenTable
+from soilml.log_import.readers import Progress, read_logs, silent
+from soilml.log_import.readers.side_files import log_files
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
 
@@ -314,3 +317,33 @@ class MapGuess:
             '# why = "the carriage was pulled"',
         ]
         return [table, WrittenTable(before=example)]
+
+
+@dataclass(frozen=True)
+class DraftedMap:
+    """A map as TOML with comments, how many of its lines are marked, and the evidence as text."""
+
+    text: str
+    marked: int
+    evidence: str
+
+
+def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
+    """Look at logs and write a map with guesses, each with its reason, as TOML with comments.
+
+    Guesses come from names, units and the behaviour of the values; checks of seconds of driving
+    mark what they doubt. What no log shows, such as the radius, is marked with CHANGE or NEEDED.
+
+    Raises `InputError` where a file cannot be read or has no columns.
+    """
+    return draft_map(logs).text
+
+
+def draft_map(
+    logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], progress: Progress = silent
+) -> DraftedMap:
+    """What `init_map` gives, with the number of lines that are marked."""
+    recordings = read_logs(log_files(logs), progress)
+    guess = MapGuess(recordings)
+    found = guess.map()
+    return DraftedMap(found.text, found.marked, guess.evidence)

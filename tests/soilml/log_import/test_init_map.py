@@ -14,7 +14,7 @@ from soilml.cli import main
 from soilml.errors import InputError
 from soilml.io.read_table import read_table
 from soilml.log_import import import_log, init_map
-from soilml.log_import.new_map import draft_map
+from soilml.log_import.guesses.map_guess import draft_map
 
 SLIPS = (0.1, 0.3, 0.5)
 
