@@ -1,18 +1,16 @@
 """Output files, written atomically as sets, also where the process is stopped.
 
-A temporary file lies beside its target until all files of a set are complete. One that a killed
-process left is removed by the next writer of the same file, a day later.
+A temporary file lies beside its target until all files of a set are complete. One that SIGKILL
+leaves stays, since nothing tells whether its writer is alive.
 """
 
 from __future__ import annotations
 
 import errno
-import glob
 import os
 import signal
 import stat
 import threading
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -23,7 +21,6 @@ from soilml.io.cell_text import one_line
 
 replaced: list[str] = []  # Names of outputs that this process has replaced, in order
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
-_ABANDONED = 86_400.0  # Seconds after which a temporary file is of no writer that is alive
 _own: set[Swap] = set()  # Swaps of this process that have begun and not ended
 
 
@@ -37,12 +34,6 @@ class Swap:
 
     def __enter__(self) -> Swap:
         _own.add(self)
-        for target in self.targets:
-            pattern = f".{glob.escape(target.name[:40])}.{'[0-9a-f]' * 8}.part"
-            for part in target.parent.glob(pattern):
-                with suppress(OSError):
-                    if time.time() - part.stat().st_mtime > _ABANDONED:
-                        part.unlink()
         return self
 
     def __exit__(self, *raised: object) -> None:

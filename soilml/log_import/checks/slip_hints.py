@@ -179,6 +179,7 @@ def _falls_with_slip(rows: RowsToCheck) -> bool:
 
 
 def slip_hints(rows: RowsToCheck) -> Iterator[Hint]:
+    """Slips that a unit, the radius or a single sensor for both speeds explains."""
     slip = rows.known("slip")
     if slip.size < 3:
         return

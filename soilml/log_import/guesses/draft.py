@@ -98,11 +98,14 @@ def travel_over_rotation(means: Mapping[str, Floats]) -> Floats:
         return np.asarray(np.abs(means["ground_speed"] / rotation))
 
 
-def fastest_ratio(inputs: Inputs) -> float:
-    """Largest ratio of travel to rotation, of means over two seconds; NaN where there are few."""
-    ratio = travel_over_rotation(driving_means(inputs, 2.0))
+def implied_radius(drafts: Mapping[str, Draft], means: Mapping[str, Floats]) -> float:
+    """The largest travel over rotation, m, 95th percentile; NaN where a channel is missing."""
+    turning = next((role for role in ("wheel_angle", "wheel_speed") if role in drafts), "")
+    ratio = travel_over_rotation(means)
     ratio = ratio[np.isfinite(ratio)]
-    return float(np.percentile(ratio, 95)) if ratio.size > 1 else float("nan")
+    if ratio.size < 2 or not turning:
+        return math.nan
+    return float(drafts[turning].keys.get("gear_ratio", 1.0)) * float(np.percentile(ratio, 95))
 
 
 def radius_of_slip(inputs: Inputs, slip: Candidate, run: Run) -> tuple[float, float]:

@@ -19,7 +19,13 @@ from soilml.log_import.checks.checked_rows import RowsToCheck, other_units
 from soilml.log_import.checks.row_hints import TRACTION, hints_of
 from soilml.log_import.checks.slip_hints import FASTEST
 from soilml.log_import.guesses.columns import Candidate, says_role, wheel_word
-from soilml.log_import.guesses.draft import Draft, driving_means, travel_over_rotation, wheel_of
+from soilml.log_import.guesses.draft import (
+    Draft,
+    driving_means,
+    implied_radius,
+    travel_over_rotation,
+    wheel_of,
+)
 from soilml.log_import.mapping.channel_map import ROTATIONS, TRAVELS, UNITS
 from soilml.log_import.mapping.written_map import Marked
 
@@ -158,24 +164,15 @@ def _doubts(
 
     Where no radius is stated, it is the largest travel over rotation.
     """
-    implied = _implied_radius(drafts, means)
+    implied = implied_radius(drafts, means)
     of_wheel = radius or (implied if _RADII[0] < implied < _RADII[1] else 0.0)
-    wheel = wheel_of(drafts, radius or implied or None)
+    known = radius or (implied if implied > 0.0 else None)
+    wheel = wheel_of(drafts, known)
     rows = Conversion(wheel, None).of(means)
     for hint in hints_of(RowsToCheck(rows, of_wheel or None, wheel, weight)):
         roles = [role for role in hint.about if role in drafts]
         if hint.code not in _OF_NO_MAP:
             yield roles, hint.text
-
-
-def _implied_radius(drafts: Mapping[str, Draft], means: Mapping[str, Floats]) -> float:
-    """The largest travel over rotation, m, 95th percentile; 0 where a channel is missing."""
-    turning = next((role for role in ROTATIONS if role in drafts), "")
-    ratio = travel_over_rotation(means)
-    ratio = ratio[np.isfinite(ratio)]
-    if not ratio.size or turning in ("", "rim_speed"):
-        return 0.0
-    return float(drafts[turning].keys.get("gear_ratio", 1.0)) * float(np.percentile(ratio, 95))
 
 
 def _confirmed(

@@ -32,7 +32,13 @@ from soilml.log_import.guesses.columns import (
     says,
 )
 from soilml.log_import.guesses.constants import agreed_constants, gears_in_names, stated_radius
-from soilml.log_import.guesses.draft import Draft, fastest_ratio, inputs_of, radius_of_slip
+from soilml.log_import.guesses.draft import (
+    Draft,
+    driving_means,
+    implied_radius,
+    inputs_of,
+    radius_of_slip,
+)
 from soilml.log_import.guesses.evidence import weigh
 from soilml.log_import.guesses.forces import by_behaviour
 from soilml.log_import.guesses.roles import assign, axle_of
@@ -289,7 +295,9 @@ class MapGuess:
                     why = Marked(f"CHANGE: {why}, which was perhaps set and not measured")
                 wheel.put("radius", f"{gear * radius:.3g} m +- 1 %", why)
                 return
-        ratio = gear * fastest_ratio(inputs) if inputs is not None and needed else math.nan
+        ratio = math.nan
+        if inputs is not None and needed:
+            ratio = implied_radius(drafts, driving_means(inputs, 2.0))
         hint = ""
         if ratio > 0.0:
             hint = f"; travel over rotation is {ratio:.3g} m"
