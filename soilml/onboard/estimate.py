@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -344,15 +344,18 @@ class Estimate(Result):
             return f"The readings do not determine {', '.join(vague)}; they determine the rest."
         return "The readings determine all quantities."
 
-    def report(self) -> Report:
-        """The verdict, each quantity of a single estimate, and intervals beside the prior."""
+    def report(self, labels: Sequence[str] | None = None) -> Report:
+        """The verdict, each quantity of a single estimate, and intervals beside the prior.
+
+        Readings are labelled by their number, or by `labels`.
+        """
         from soilml.report.column_figure import ParameterIntervals
         from soilml.report.report import Report
         from soilml.report.tables import ReportTable
 
         q, columns = len(self.names), self.frame_columns()
         mean, low, high = (v.reshape(-1, q) for v in (self.mean, self.low, self.high))
-        labels = [str(i) for i in range(1, len(mean) + 1)]
+        labels = labels or [str(i) for i in range(1, len(mean) + 1)]
         ends = self.prior.lower, self.prior.upper
         drawn = ParameterIntervals(self.names, self.units, labels, mean, low, high, *ends)
         one = "quantity" in columns
