@@ -370,11 +370,6 @@ class Estimate(Result):
             title="Estimate",
         )
 
-    def _rows(self) -> Iterable[tuple[Any, ...]]:
-        q = len(self.names)
-        parts = (self.mean, self.std, self.low, self.high)
-        return zip(self.names, self.units, *(x.reshape(-1, q)[0] for x in parts), strict=True)
-
     def frame_columns(self) -> dict[str, Any]:
         """A row for each quantity of a single estimate; for each reading of several.
 
@@ -382,9 +377,8 @@ class Estimate(Result):
         ends in _std, _p05 and _p95, with the unit in the name.
         """
         if np.ndim(self.in_range) == 0:
-            keys = ("quantity", "unit", "mean", "std", "low", "high")
-            found = dict(zip(keys, zip(*self._rows(), strict=True), strict=True))
-            return {key: list(found[key]) for key in (*keys[:1], *keys[2:], "unit")}
+            parts = {key: list(getattr(self, key)) for key in ("mean", "std", "low", "high")}
+            return {"quantity": list(self.names), **parts, "unit": list(self.units)}
         columns: dict[str, Any] = {"reading": np.arange(np.size(self.in_range))}
         return columns | self.reading_columns()
 
