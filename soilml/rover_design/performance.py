@@ -26,6 +26,7 @@ from soilml.physics.soils import Soil
 from soilml.processes import process_map, usable_cores
 from soilml.rover_design.study import DesignStudy
 from soilml.rover_design.worlds import DrawnWorlds
+from soilml.traction.rover_performance import NeededSlip
 
 #: Slips of a sweep and of a reported design, as shares of the slip limit.
 SWEPT = np.asarray([0.12, 0.3, 0.55, 0.8, 1.0])
@@ -148,8 +149,8 @@ def _of_equal_wheels(
     load = designs["mass"][:, None] * study.axle_loads(wheels, goal.slope)  # (k, axles)
     shape = (count, worlds.count, load.shape[1], len(slip))
     pull, torque, sinkage = (np.empty(shape) for _ in range(3))
-    for name, draw in worlds.groups():
-        force = _forces(designs, load, worlds, name, draw, slip, quick)
+    for draw in worlds.groups():
+        force = _forces(designs, load, worlds, draw, slip, quick)
         pull[:, draw] = force.drawbar_pull
         torque[:, draw] = force.torque
         sinkage[:, draw] = force.sinkage
@@ -160,7 +161,7 @@ def _of_equal_wheels(
     best = np.argmax(known, axis=-1)[..., None]
     margin = np.take_along_axis(known, best, axis=-1)[..., 0] - needed
     error = 2.0 * np.take_along_axis(pull_error.sum(axis=2), best, axis=-1)[..., 0]
-    at = _Needed.of(total, needed)
+    at = NeededSlip.of(total, needed)
     radius = designs["radius"][:, None, None]
     work = 2.0 * torque.sum(axis=2) / (radius * (1.0 - slip))
     found_slip = at.of_curve(np.broadcast_to(slip, total.shape))
@@ -179,7 +180,6 @@ def _forces(
     designs: Mapping[str, Floats],
     load: Floats,
     worlds: DrawnWorlds,
-    effect: str,
     draw: NDArray[np.int64],
     slip: Floats,
     quick: bool,
@@ -188,7 +188,7 @@ def _forces(
     shape = (len(load), len(draw), load.shape[1], len(slip))
     design, world, axle, column = (grid.ravel() for grid in np.indices(shape))
     world = draw[world]
-    effects = worlds.effects(effect, world, load.mean(axis=1)[design])
+    effects = worlds.effects(world, load.mean(axis=1)[design])
     if np.any(designs["lug_height"] > 0.0):
         lugs = Grousers(
             height=designs["lug_height"][design],
@@ -259,32 +259,6 @@ def _range_with_zero(values: Floats) -> Floats:
     known = np.nan_to_num(values)
     high, low = known.max(axis=-1, keepdims=True), known.min(axis=-1, keepdims=True)
     return np.asarray(np.maximum(high, 0.0) - np.minimum(low, 0.0))
-
-
-@dataclass(frozen=True)
-class _Needed:
-    """Where curves over the slips reach what is needed: index before, share of the way, whether."""
-
-    before: NDArray[np.int64]
-    index: NDArray[np.int64]
-    share: Floats
-    reached: NDArray[np.bool_]
-
-    @staticmethod
-    def of(total: Floats, needed: Floats) -> _Needed:
-        """For totals (k, n, m) and what is needed (k, 1)."""
-        enough = np.nan_to_num(total, nan=-np.inf) >= needed[..., None]
-        index = np.argmax(enough, axis=-1)[..., None]
-        before = np.maximum(index - 1, 0)
-        low, high = (np.take_along_axis(total, i, axis=-1) for i in (before, index))
-        rise = np.where(high > low, high - low, 1.0)
-        share = np.where(index > 0, (needed[..., None] - low) / rise, 1.0)
-        return _Needed(before, index, share, np.asarray(enough.any(axis=-1)))
-
-    def of_curve(self, values: Floats) -> Floats:
-        """Values (k, n, m) interpolated there, (k, n); NaN where it is not reached."""
-        low, high = (np.take_along_axis(values, i, axis=-1) for i in (self.before, self.index))
-        return np.where(self.reached, (low + self.share * (high - low))[..., 0], np.nan)
 
 
 def lugs_needed(radius: Floats, height: Floats, sinkage: Floats, slip: Floats) -> Floats:
