@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats, Real
-from soilml.parameters import mapped
+from soilml.arrays import Floats
 from soilml.physics.contact import Force
 from soilml.physics.effects.grousers import Grousers
-from soilml.physics.equilibrium import without_unsolved
-from soilml.physics.forces import apply_input_effects
 from soilml.physics.gears import Wheel
-from soilml.physics.load_case import LoadCase
-from soilml.physics.model import Model, in_chunks
+from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
-from soilml.physics.sinkage_estimate import coarse_estimate
-from soilml.physics.sinkage_search import equilibrium_near
-from soilml.physics.soils import Soil
 from soilml.processes import process_map, usable_cores
 from soilml.rover_design.study import DesignStudy
 from soilml.rover_design.worlds import DrawnWorlds
@@ -67,7 +59,6 @@ def evaluate(
     worlds: DrawnWorlds,
     *,
     shares: Floats = REPORTED,
-    quick: bool = False,
 ) -> Outcomes:
     r"""Outcomes of designs in worlds.
 
@@ -80,7 +71,6 @@ def evaluate(
 
     designs: Values (k,) by dimension of the study.
     shares: Slips, as shares of the slip limit.
-    quick: Take the equilibrium next to an estimate, without looking for an earlier one.
 
     Raises `InputError` where a wheel leaves the ground on the slope.
 
@@ -92,7 +82,7 @@ def evaluate(
     for wheels in np.unique(designs["wheels"]):
         own = np.flatnonzero(designs["wheels"] == wheels)
         values = {name: column[own] for name, column in designs.items()}
-        parts.append((own, _of_equal_wheels(study, int(wheels), values, worlds, shares, quick)))
+        parts.append((own, _of_equal_wheels(study, int(wheels), values, worlds, shares)))
     joined = {}
     for field in fields(Outcomes):
         one = getattr(parts[0][1], field.name)
@@ -109,7 +99,7 @@ def in_blocks(
     keep: Callable[[NDArray[np.int64], Outcomes], None],
     progress: Callable[[int], None] | None = None,
 ) -> None:
-    """Evaluate designs quickly, on the slips of a sweep, in blocks and by several processes.
+    """Evaluate designs on the slips of a sweep, in blocks and by several processes.
 
     keep: Given the numbers of some designs (b,) and their outcomes, which are not held.
     progress: Given the number of designs done.
@@ -131,8 +121,8 @@ def in_blocks(
 
 
 def _swept(study: DesignStudy, worlds: DrawnWorlds, designs: Mapping[str, Floats]) -> Outcomes:
-    """Quick outcomes of designs (k,) on the slips of a sweep."""
-    return evaluate(study, designs, worlds, shares=SWEPT, quick=True)
+    """Outcomes of designs (k,) on the slips of a sweep."""
+    return evaluate(study, designs, worlds, shares=SWEPT)
 
 
 def _of_equal_wheels(
@@ -141,7 +131,6 @@ def _of_equal_wheels(
     designs: Mapping[str, Floats],
     worlds: DrawnWorlds,
     shares: Floats,
-    quick: bool,
 ) -> Outcomes:
     """The outcomes of designs that have the same number of wheels."""
     goal, count = study.goal, len(designs["radius"])
@@ -150,7 +139,7 @@ def _of_equal_wheels(
     shape = (count, worlds.count, load.shape[1], len(slip))
     pull, torque, sinkage = (np.empty(shape) for _ in range(3))
     for draw in worlds.groups():
-        force = _forces(designs, load, worlds, draw, slip, quick)
+        force = _forces(designs, load, worlds, draw, slip)
         pull[:, draw] = force.drawbar_pull
         torque[:, draw] = force.torque
         sinkage[:, draw] = force.sinkage
@@ -182,7 +171,6 @@ def _forces(
     worlds: DrawnWorlds,
     draw: NDArray[np.int64],
     slip: Floats,
-    quick: bool,
 ) -> Force:
     """Forces (k, g, axles, m) of k designs in the g worlds of one group."""
     shape = (len(load), len(draw), load.shape[1], len(slip))
@@ -200,37 +188,8 @@ def _forces(
     at = Operating(
         slip=slip[column], load=load[design, axle], pass_number=axle + 1.0, slip_angle=0.0
     )
-    model, soil = Model(gear, tuple(effects)), worlds.of_soil(world)
-    force = _nearest(model, soil, at) if quick else model(soil, at)
+    force = Model(gear, tuple(effects))(worlds.of_soil(world), at)
     return Force(**{f.name: np.reshape(getattr(force, f.name), shape) for f in fields(Force)})
-
-
-def _nearest(model: Model, soil: Soil, at: Operating) -> Force:
-    """Forces at the equilibrium next to a coarse estimate; rows without it by the full search."""
-    load_case, _ = model.load_case(soil, at)
-
-    def solve(part: LoadCase) -> Force:
-        part = apply_input_effects(part)
-        found = equilibrium_near(part, replace(coarse_estimate(part), nearest=True, rough=True))
-        return without_unsolved(found)
-
-    with np.errstate(all="ignore"):
-        force = in_chunks(load_case, solve)
-        failed = np.flatnonzero(force.status != 0)
-        if failed.size:
-            again = _rows(model, soil, at, failed)
-            for field in fields(Force):
-                getattr(force, field.name)[failed] = getattr(again, field.name)
-    return force
-
-
-def _rows(model: Model, soil: Soil, at: Operating, index: NDArray[np.int64]) -> Force:
-    """Forces of some rows by the full search."""
-
-    def some(value: Any) -> Real:
-        return np.asarray(value)[index] if np.ndim(value) else value
-
-    return mapped(model, some)(mapped(soil, some), mapped(at, some))
 
 
 def _with_errors(

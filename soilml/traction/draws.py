@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,3 +94,16 @@ class SoilDraws:
             return force
         slip, load = (np.asarray(v, dtype=np.float64) for v in (at.slip, at.load))
         return self.errors.added_to(force, gear, draw, slip, load)
+
+    def on_grid(
+        self, case: Case, load: Floats, slip: Floats, gear: str = "", **others: Any
+    ) -> Force:
+        """Forces (..., n, m) of each draw at loads (..., n), N, and slips (m,).
+
+        others: Further fields of `Operating`, alike for all.
+        """
+        shape = (*load.shape, len(slip))
+        *_, draw, column = (grid.ravel() for grid in np.indices(shape))
+        at = Operating(slip=slip[column], load=np.repeat(load.ravel(), len(slip)), **others)
+        force = self.forces(case, draw, at, gear)
+        return Force(**{f.name: np.reshape(getattr(force, f.name), shape) for f in fields(Force)})

@@ -14,7 +14,6 @@ from soilml.errors import InputError
 from soilml.fitting.mixtures import without_faults
 from soilml.fitting.operating_points import wheel_gears, wheel_passes
 from soilml.numerics.root_finding import rising_root
-from soilml.physics.operating_point import Operating
 from soilml.traction.draws import SoilDraws
 
 SAME_LOAD = 1e-9  # Loads (N) that agree to this share are those of one wheel, solved once
@@ -78,34 +77,16 @@ def wheel_curves(
             and np.allclose(load, other, rtol=SAME_LOAD, atol=0.0)
         ]
         if not same:
-            found = _forces(own_case, draws, load, slip, passes[name], speed, gears[name])
+            force = draws.on_grid(
+                without_faults(own_case), load, slip, gears[name],
+                pass_number=float(passes[name]), speed=speed, slip_angle=0.0,
+            )  # fmt: skip
+            found = force.drawbar_pull, force.torque, force.sinkage
             solved.append((gears[name], passes[name], load, found))
             same = [found]
         curves.append(same[0])
     pull, torque, sinkage = (np.stack(each) for each in zip(*curves, strict=True))
     return WheelCurves(pull, torque, sinkage, np.asarray(radius))
-
-
-def _forces(
-    case: Case,
-    draws: SoilDraws,
-    load: Floats,
-    slip: Floats,
-    number: int,
-    speed: float | None,
-    gear: str,
-) -> tuple[Floats, ...]:
-    case = without_faults(case)
-    draw, column = (grid.ravel() for grid in np.indices((len(load), len(slip))))
-    at = Operating(
-        slip=slip[column], load=load[draw], pass_number=float(number), speed=speed, slip_angle=0.0
-    )
-    force = draws.forces(case, draw, at, gear)
-    shape = (len(load), len(slip))
-    return tuple(
-        np.reshape(np.asarray(part), shape)
-        for part in (force.drawbar_pull, force.torque, force.sinkage)
-    )
 
 
 @dataclass(frozen=True)
