@@ -108,21 +108,16 @@ def _same(name: str, unit: str, soil: str, equation: str) -> MappedParameter:
     return MappedParameter(name, unit, equation, (soil,), lambda v: v[soil])
 
 
-def _friction(name: str) -> MappedParameter:
-    equation = "tan(friction_angle)"
-    return MappedParameter(
-        name, "1", equation, ("friction_angle",), lambda v: math.tan(v["friction_angle"])
-    )
+_TAN = ("1", "tan(friction_angle)", math.tan)
+_DEGREES = (
+    "deg", "180/pi friction_angle, of Mohr-Coulomb: tau_max = c + sigma tan(phi)", math.degrees
+)  # fmt: skip
 
 
-def _degrees(name: str) -> MappedParameter:
-    return MappedParameter(
-        name,
-        "deg",
-        "180/pi friction_angle, of Mohr-Coulomb: tau_max = c + sigma tan(phi)",
-        ("friction_angle",),
-        lambda v: math.degrees(v["friction_angle"]),
-    )
+def _angle(name: str, unit: str, equation: str, value: Callable[[float], float]) -> MappedParameter:
+    """A function of the friction angle."""
+    of_angle = ("friction_angle",)
+    return MappedParameter(name, unit, equation, of_angle, lambda v: value(v["friction_angle"]))
 
 
 _STRESS_ANGLE = "the pressure along the contact follows from depth, without an angle of its own"
@@ -240,7 +235,7 @@ _CHRONO_SCM = SoilTarget(
         _same("Bekker_Kc", "N/m^(n+1)", "kc", "kc; 1/b is perimeter / (2 area) of the contact"),
         _same("Bekker_n", "1", "n", "n"),
         _same("Mohr_cohesion", "Pa", "cohesion", "cohesion, of tau_max = c + sigma tan(phi)"),
-        _degrees("Mohr_friction"),
+        _angle("Mohr_friction", *_DEGREES),
         _same("Janosi_shear", "m", "shear_modulus", "K, of tau = tau_max (1 - exp(-j/K))"),
     ),
     asked=(
@@ -255,8 +250,7 @@ _CHRONO_SCM = SoilTarget(
         ),
     ),
     ignored={
-        "a0": _STRESS_ANGLE,
-        "a1": _STRESS_ANGLE,
+        **dict.fromkeys(("a0", "a1"), _STRESS_ANGLE),
         "unit_weight": "SCM has no weight of the soil; bulldozing has parameters of its own",
     },
     files={"scm_soil{}.json": _scm},
@@ -287,8 +281,8 @@ _CHRONO_CRM = SoilTarget(
             "density", "kg/m^3", "unit_weight / 9.80665 m/s^2", ("unit_weight",),
             lambda v: v["unit_weight"] / 9.80665,
         ),
-        _friction("mu_fric_s"),
-        _friction("mu_fric_2"),
+        _angle("mu_fric_s", *_TAN),
+        _angle("mu_fric_2", *_TAN),
         _same("cohesion_coeff", "Pa", "cohesion", "cohesion, of tau_max = mu p + c"),
     ),
     asked=(
@@ -299,8 +293,7 @@ _CHRONO_CRM = SoilTarget(
     ),
     ignored=dict.fromkeys(("kc", "kphi", "n"), _NO_BEARING) | {
         "shear_modulus": "CRM shears by its Young's modulus, not by a displacement K",
-        "a0": _STRESS_ANGLE,
-        "a1": _STRESS_ANGLE,
+        **dict.fromkeys(("a0", "a1"), _STRESS_ANGLE),
     },
     files={"crm_soil{}.json": lambda values: json_text(dict(values))},
     loading="""\
@@ -325,17 +318,16 @@ _GAZEBO = SoilTarget(
         _same("k_c", "N/m^(n+1)", "kc", "kc; the plugin takes k = k_c / b + k_phi"),
         _same("k_phi", "N/m^(n+2)", "kphi", "kphi"),
         _same("c", "Pa", "cohesion", "cohesion"),
-        _degrees("phi"),
+        _angle("phi", *_DEGREES),
         _same("K", "m", "shear_modulus", "K, of tau = (c + sigma tan(phi)) (1 - exp(-j/K))"),
         _same("rho", "N/m^3", "unit_weight", "unit_weight: rho is a weight, for bulldozing"),
         _same("n", "1", "n", "n"),
-        _friction("mu"),
+        _angle("mu", *_TAN),
     ),
     asked=(),
-    ignored={
-        "a0": "gz-terramechanics puts the maximum stress at half the entry angle",
-        "a1": "gz-terramechanics puts the maximum stress at half the entry angle",
-    },
+    ignored=dict.fromkeys(
+        ("a0", "a1"), "gz-terramechanics puts the maximum stress at half the entry angle"
+    ),
     files={"soil_params{}.yaml": _GAZEBO_PLUGIN, "surface{}.sdf": _SDF_SURFACE},
     loading="""\
 Take one of the two, not both: the plugin expects wheels without friction of their own.
@@ -359,7 +351,7 @@ _ISAAC = SoilTarget(
         "https://nvidia-omniverse.github.io/PhysX/physx/5.6.0/_api_build/structPxCombineMode.html",
         "https://openusd.org/release/api/class_usd_physics_material_a_p_i.html",
     ),
-    mapped=(_friction("staticFriction"), _friction("dynamicFriction")),
+    mapped=(_angle("staticFriction", *_TAN), _angle("dynamicFriction", *_TAN)),
     asked=(
         AskedParameter("restitution", "1", 0.0, "not measured; the default of USD: no rebound"),
     ),
