@@ -37,6 +37,7 @@ _OF_MASS = (0.5, 2.0)  # Load over its share of the stated mass
 _SAME_SIZE = 0.95  # Ratio of the sizes of two columns that may hold the same
 _ADDED = ("load", "drawbar_pull")  # Roles of which two equal columns may be parts of one
 _WITH_A_ZERO = ("torque", "motor_current", "drawbar_pull")  # Roles that read zero at rest
+_SET = ("load", "slip", "slope")  # Roles that a rig may keep at one value
 #: Largest fraction that a column of slip may hold, and the least one of per cent: (r omega - v)/v
 #: lies between, and above 30 it were a slip of 0.97.
 MOST_FRACTION, LEAST_PERCENT, _SURELY_PERCENT = 1.0, 5.0, 30.0
@@ -117,6 +118,8 @@ def weigh(
         )  # fmt: skip
         if role in shown and not isinstance(shown[role], Marked) and stated:
             found[role].physics = shown[role]
+        if own.about.constant and role not in _SET:
+            found[role].against = f"it reads {own.about.middle:.3g} throughout"
     if inputs is not None:
         means = driving_means(inputs)
         marked = {role for role, why in shown.items() if isinstance(why, Marked)}

