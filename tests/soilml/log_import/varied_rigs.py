@@ -30,7 +30,7 @@ RIGS = {
                 "affondamento (mm)": ("z", 1e3)}, {"separator": ";", "decimal": ","}),
     "portuguese": (ALL, {"tempo [s]": "t", "rotação da roda [rpm]": ("w", RPM), "torque [Nm]": "T",
                    "velocidade do carrinho [m/s]": "v", "carga vertical [N]": "W"}, {}),
-    "russian": ("", {"время, с": "t", "угловая скорость колеса [rad/s]": "w",
+    "russian": ("", {"время [s]": "t", "угловая скорость колеса [rad/s]": "w",
                 "скорость тележки [m/s]": "v", "крутящий момент [N m]": "T"}, {}),
     "odometry": ("rotation torque load", USUAL | {"cart speed [m/s]": ("rim", 1.05)}, {}),
     "current_as_torque": ("rotation travel load", USUAL | {"torque [Nm]": "one",
