@@ -283,20 +283,8 @@ def _torque_alone(sets: Sequence[Judged]) -> Iterator[Figure]:
 
 
 def _probabilities(sets: Sequence[Judged]) -> Iterator[Figure]:
-    stated, true = gap_reliability.statements(sets)
-    start = "stated probabilities"
-    for name, bins, gate in (
-        ("bins of 50", gap_reliability.equal_bins(stated, true), ""),
-        ("wide bins", gap_reliability.wide_bins(stated, true), "<= 0.05"),
-    ):
-        worst, (usual, seldom) = gap_reliability.largest(bins), gap_reliability.chance(bins)
-        text = f"{worst:.3f}; by chance alone {usual:.3f} (95 %: {seldom:.3f})"
-        yield number(f"{start}, largest deviation, {name}", worst, text, gate)
-    as_much = gap_reliability.chance_of_as_much(stated, true)
-    name = f"{start}, share of exact ones that deviate as much in all wide bins"
-    yield number(name, as_much, f"{as_much:.3f}", ">= 0.05")
     found, (low, high), (usual, seldom) = gap_reliability.calibration_error(sets)
-    name = f"{start} from {gap_reliability.NOTABLE:g}, expected calibration error"
+    name = f"stated probabilities from {gap_reliability.NOTABLE:g}, expected calibration error"
     text = f"{found:.3f} ({low:.3f}-{high:.3f}); by chance alone {usual:.3f} (95 %: {seldom:.3f})"
     yield number(name, found, text, "<= 0.05")
 

@@ -195,13 +195,12 @@ def hypotheses(posterior: Posterior, node: Explanation) -> list[StageHypothesis]
     readings, usual, fit = posterior.terms.readings, posterior.terms.usual, node.fit
     variables = _variables(posterior, node)
     found = []
-    for change in stage_changes(fit.fitted(), readings):
-        if change.along:
-            found.append(StageHypothesis(change.stage, change.along, change.columns))
-            continue
-        for name, columns in variables.items():
-            if change.stage != OPERATING or name in OF_OPERATION:
-                found.append(StageHypothesis(change.stage, name, change.columns * columns))
+    for stage, change in stage_changes(fit.fitted(), readings):
+        found += [
+            StageHypothesis(stage, name, change[:, None] * columns)
+            for name, columns in variables.items()
+            if stage != OPERATING or name in OF_OPERATION
+        ]
     for i, channel in enumerate(readings.channels):
         own = readings.channel == i
         for name, columns in variables.items():
