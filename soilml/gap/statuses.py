@@ -16,7 +16,7 @@ _NEXT = "Make the first run under Next runs"
 
 
 @dataclass(frozen=True)
-class Status:
+class Verdict:
     """What a status says, in words.
 
     headline: Template of the verdict, of the figures that `soilml.gap.sentences` has.
@@ -31,20 +31,20 @@ class Status:
 
 
 STATUSES = {
-    "no-gap": Status(
+    "no-gap": Verdict(
         "model and measurements agree within the noise",
         "{agreement}",
         "Use the model as it is, within the measured range of slip and load.",
         "good",
     ),
-    "named": Status(
+    "named": Verdict(
         "exactly one explanation of the catalogue accounts for the gap",
         "Missing effect: {names}{sure}{shrinks}.",
         f"model.toml contains the effect. {_NEXT} to confirm it.",
         "plain",
         (_OUTSIDE,),
     ),
-    "partly-named": Status(
+    "partly-named": Verdict(
         "the evidence supports these effects; a smooth remainder is left unexplained",
         "Missing effect, among others: {names}{sure}{shrinks}.",
         "model.toml contains the effect and, under [discrepancy], the size of what is left, which "
@@ -52,7 +52,7 @@ STATUSES = {
         "plain",
         (_OUTSIDE, _LEFT),
     ),
-    "class": Status(
+    "class": Verdict(
         "several explanations account for the gap; these runs cannot distinguish them",
         "Missing effect: one of {count} explanations, likeliest {names}{sure}{shrinks}.",
         f"{_NEXT}: it discriminates best between the explanations.",
@@ -60,14 +60,14 @@ STATUSES = {
             Remark("which-effect", "which of the effects is present; model.toml mixes all"),
         ),
     ),
-    "form-open": Status(
+    "form-open": Verdict(
         "one effect accounts for the gap, with a law that differs from the catalogue's",
         "Missing effect: {names}, by another law than the catalogue's{sure}{shrinks}.",
         "model.toml contains the effect with a law fitted to these data. Use it within the "
         "measured range of slip and load.",
         unsupported=(_OUTSIDE, Remark("law", _LAW)),
     ),
-    "suspected": Status(
+    "suspected": Verdict(
         "ranked suspects: no cause can be named",
         "Cause not certain: first suspect is {names}{sure}{shrinks}.",
         f"{_NEXT}. model.toml mixes the explanations that hold 95 % together, each with its "
@@ -76,7 +76,7 @@ STATUSES = {
             Remark("cause", "any cause: model.toml predicts by a mixture of the explanations"),
         ),
     ),
-    "unknown": Status(
+    "unknown": Verdict(
         "there is a gap that no effect explains better than a smooth error",
         "There is a gap{which} ({size}; probability {gap}).",
         "See where the model disagrees, then check the sensors and the rig, or define an effect of "
@@ -85,18 +85,18 @@ STATUSES = {
             Remark("cause", "any cause: model.toml contains the refitted soil and no new effect"),
         ),
     ),
-    "undecided": Status(
+    "undecided": Verdict(
         "measurements disagree with each other more than their noise allows",
         "{disagreement}",
         "Find out why the measurements disagree: correct the noise in the model file or the runs, "
         "and analyse again.",
     ),
-    "not-testable": Status(
+    "not-testable": Verdict(
         "there is a gap, but these runs cannot identify its cause",
         "There is a gap, but these runs cannot identify its cause: {why}.",
         "Add the runs that the verdict asks for, and analyse again.",
     ),
-    "bad-data": Status(
+    "bad-data": Verdict(
         "the data cannot be analysed",
         "{faults}",
         "Correct the runs or the model file as listed below, and analyse again.",
