@@ -336,7 +336,11 @@ class Search:
             if h not in self.nodes and h not in self._tried
         ]
         open_.sort()
-        within = [own for own in open_ if own[0] < lowest + constants.NEAR][: constants.FITS]
+        within = [
+            (value, h)
+            for value, h in open_
+            if value < lowest + (constants.NEAR if len(h.effects) <= 1 else constants.NEAR_SET)
+        ][: constants.FITS]
         if first:
             singles = [own for own in open_ if len(own[1].effects) == 1]
             within = sorted({*within, *singles[: constants.FITS // 2]})
