@@ -76,8 +76,7 @@ def tables(every: Sequence[Judged]) -> str:
     """All sections."""
     sets = gf.sampled(every)
     parts = [_head(every, sets), _gates(every), _statuses(sets), _held_out(sets), _families(sets)]
-    parts += [_reliability(sets), _causes(sets)]
-    return "\n\n".join(part for part in (*parts, _designs(sets)) if part)
+    return "\n\n".join(part for part in (*parts, _reliability(sets)) if part)
 
 
 def _head(every: Sequence[Judged], sets: Sequence[Judged]) -> str:
@@ -99,11 +98,6 @@ def _gates(sets: Sequence[Judged]) -> str:
         "suspects, all others by their cause set.\n\n"
         + markdown(("figure", "measured", "gate", "met"), rows, 4)
     )
-
-
-def rates(*judge):  # type: ignore[no-untyped-def]
-    """Statistics: the rate of each judgement."""
-    return [lambda own, of=of: rate(sum(map(of, own)), len(own)) for of in judge]
 
 
 def of_unique(own: Sequence[Judged]) -> str:
@@ -134,7 +128,10 @@ def _by_level(sets: Sequence[Judged]) -> list[Judged]:
 
 def _statuses(sets: Sequence[Judged]) -> str:
     own = _by_level([s for s in gf.named_designs(sets) if nameable(s)])
-    (contains,) = rates(holds)
+
+    def contains(of: Sequence[Judged]) -> str:
+        return rate(sum(map(holds, of)), len(of))
+
     columns = {"cause set contains the cause": contains, "right when unique": of_unique}
     alone = _by_level([s for s in sets if s["tier"] == "D"])
     return "\n\n".join(
@@ -210,36 +207,6 @@ def _reliability(sets: Sequence[Judged]) -> str:
         f"{len(stated)} statements, one for each effect that a set could test. A statement is true "
         "if the effect was hidden in that set.\n\n"
         + markdown(("stated, mean", "hidden", "difference"), rows, 3)
-    )
-
-
-def _causes(sets: Sequence[Judged]) -> str:
-    own = [s for s in gf.named_designs(sets) if nameable(s)]
-    own = sorted((s | {"hidden": "+".join(s["truth"])} for s in own), key=lambda s: s["hidden"])
-    total, wrong = Counter(s["hidden"] for s in own), Counter()
-    for s in own:
-        if not holds(s):
-            said = "+".join(s["cause_set"][0]) if s.get("cause_set") else f"`{s['status']}`"
-            wrong[s["hidden"], said] += 1
-    cells = sorted(wrong.items(), key=lambda c: (-c[1], c[1] / total[c[0][0]], c[0][0]))
-    rows = [(t, said, f"{k}/{total[t]}") for (t, said), k in cells[:12]]
-    contains, named = rates(holds, first)
-    columns = {"cause set contains it": contains, "first": named, "right when unique": of_unique}
-    return (
-        "## Weakest cells of the confusion matrix\n\nTruth outside the cause set, separating SNR "
-        f"of 3 or more.\n\n{markdown(('truth', 'said instead', 'sets'), rows, 3)}\n\n"
-        f"## By cause\n\n{table(own, {'truth': 'hidden'}, columns)}"
-    )
-
-
-def _designs(sets: Sequence[Judged]) -> str:
-    ordered = [s for name in DESIGNS for s in sets if s["design"] == name]
-    null = [s for s in ordered if gf.bare(s) or s["tier"] == "D"]
-    return (
-        "## What was said, by design\n\nWith a cause of the catalogue:\n\n"
-        + _counts([s for s in ordered if s["catalogued"]], "design", "design")
-        + "\n\nWith nothing hidden, or a discrepancy alone:\n\n"
-        + _counts(null, "design", "design")
     )
 
 
