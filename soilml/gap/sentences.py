@@ -213,6 +213,8 @@ def listed_explanations(report: GapReport) -> str:
     Suspects have their probabilities; one whose probability is only a bound stands in the table
     alone.
     """
+    if report.status not in ("suspected", "class", "unknown"):
+        return ""
     if report.status == "class":
         begin = "These runs cannot distinguish, the likeliest first:"
         sets = [" + ".join(names) for names in report.cause_set]
@@ -220,7 +222,7 @@ def listed_explanations(report: GapReport) -> str:
         if left := len(sets) - len(kept):
             kept.append(f"{left} other{'s' if left > 1 else ''}")
         said = f"{begin} {', or '.join(kept)}."
-    else:
+    elif report.status == "suspected":
         stated = [s for s in report.suspects if s.probability >= LEAST_STATED][:SUSPECTS_IN_LINE]
         if not stated:
             return ""
@@ -229,9 +231,11 @@ def listed_explanations(report: GapReport) -> str:
         said = f"{begin} {'; '.join(parts[: _fitting(begin, parts)])}."
         if needed := needed_sizes(stated[0].times_usual):
             said += f" The first needs {needed}."
+    else:
+        said = ""
     if (outside := report.outside_probability) >= NOTABLE_OUTSIDE:
-        said += f" That the catalogue lacks the cause: {decimal(outside, 2)}."
-    return said
+        said += f" Probability that the catalogue lacks the cause: {decimal(outside, 2)}."
+    return said.strip()
 
 
 def _fitting(begin: str, parts: Sequence[str]) -> int:
@@ -272,7 +276,7 @@ def report_lines(report: GapReport, model_effects: Sequence[str] = ()) -> tuple[
         why = report.reasons or ((NOT_DECISIVE,) if report.status == "suspected" else ())
         text = _in_sentences("Why no cause is named", [short_reason(reason) for reason in why])
         lines += [Remark("why", text)] if why else []
-    if report.status in ("suspected", "class") and (listed := listed_explanations(report)):
+    if listed := listed_explanations(report):
         lines.append(Remark("suspects", listed))
     if left := _remainder(report):
         lines.append(Remark("left", left))

@@ -184,9 +184,10 @@ def test_suspects_have_their_probabilities_and_the_first_three_are_listed():
 @pytest.mark.parametrize("outside, stated", [(0.049, False), (0.24, True)])
 def test_a_cause_outside_the_catalogue_has_its_probability(outside, stated):
     sets = {"effects": (effect("dig"),), "cause_set": (("dig",), ("rate",))}
-    for status, parts in (("class", sets), ("suspected", {"suspects": (Suspect(("a",), 0, 0.5),)})):
-        text = lines(status, **parts, outside_probability=outside)["suspects"]
-        assert text.endswith("That the catalogue lacks the cause: 0.24.") == stated
+    suspect = {"suspects": (Suspect(("a",), 0.0, 0.5),)}
+    for status, parts in (("class", sets), ("suspected", suspect), ("unknown", {})):
+        text = lines(status, **parts, outside_probability=outside).get("suspects", "")
+        assert text.endswith("Probability that the catalogue lacks the cause: 0.24.") == stated
 
 
 def test_explanations_by_what_is_claimed():
