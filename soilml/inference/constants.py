@@ -67,9 +67,9 @@ TRUSTED = 4.0
 #: Decrease of -2 ln p, change of the logarithm of a hyperparameter, or log odds of a straying
 #: reading, from which a fit is repeated: a hysteresis, so that the search ends.
 WORTH_A_FIT = 0.5
-#: Fits of one round, and rounds, or fits of an explanation in turn with its hyperparameters. The
-#: first round has half as many single effects in any case.
-FITS, ROUNDS = 8, 7
+#: Fits of one round, of which the first has half as many single effects in any case; rounds; and
+#: fits of an explanation in turn with its hyperparameters, or explanations that are extended.
+FITS, ROUNDS, IN_TURN = 8, 7, 6
 #: Size from which the fit of an effect starts, in reference sizes: off zero, where the derivative
 #: of some effects vanishes.
 START_SIZE = 0.7

@@ -262,7 +262,7 @@ class Search:
         lowest: The value of the best node so far.
         """
         found: dict[Hypothesis, Explanation] = {}
-        for turn in range(constants.ROUNDS):
+        for turn in range(constants.IN_TURN):
             again = []
             fits = self.fit(jobs, COARSE if turn == 0 else FINE)
             for job, fit in zip(jobs, fits, strict=True):
@@ -321,7 +321,7 @@ class Search:
         """The fits of the next round; in the first one the best single effects in any case."""
         lowest = self.lowest
         near = sorted(self.nodes.values(), key=lambda node: node.value)
-        near = [node for node in near if node.value < lowest + constants.NEAR][: constants.ROUNDS]
+        near = [node for node in near if node.value < lowest + constants.NEAR][: constants.IN_TURN]
         for node in {id(n): n for n in (*near, self.nodes[SOIL_ALONE])}.values():
             if node.extended:
                 continue
