@@ -11,7 +11,6 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.fitted_readings import FittedReadings
 from soilml.physics.soils.soil_tests import deviations
-from soilml.quantities import CHANNELS
 from soilml.remarks import Remark
 from soilml.report.numbers import format_residual
 from soilml.results import EstimatedValue, Result
@@ -84,7 +83,6 @@ class RemainderCause:
 
     stage: str  # a key of `_STAGES`, or the one channel that has it: a force or a sensor
     depends_on: str  # the quantity of which it is a smooth function; empty where unknown
-    channels: tuple[str, ...]  # whose readings it changes by more than half of their noise
     #: That the remainder acts at this stage, all others, several causes together and unknown ones
     #: included: at most 0.95
     probability: float
@@ -93,24 +91,19 @@ class RemainderCause:
     beside: tuple[str, ...] = ()  # effects beside which the remainder is left
 
     def remark(self) -> Remark:
-        """The description in one or two sentences.
+        """The description in a sentence.
 
-        >>> found = RemainderCause("normal stress", "load", ("torque", "sinkage"), 0.96, 4.2)
-        >>> print(found.remark())
+        >>> print(RemainderCause("normal stress", "load", 0.96, 4.2).remark())
         The remainder beside the soil alone looks like a change of the normal stress that depends on
-        load. Torque and sinkage share it.
+        load.
         """
-        alone, own = self.stage in CHANNELS, self.stage.replace("_", " ")
-        depends = shared = ""
+        own, depends = self.stage.replace("_", " "), ""
         if self.depends_on:
             depends = f" that depends on {_VARIABLES.get(self.depends_on, self.depends_on)}"
         what = f"an error of the {own} alone, of a force or of its sensor{',' if depends else ''}"
-        if not alone and len(self.channels) > 1:
-            *first, last = (channel.replace("_", " ") for channel in self.channels)
-            shared = f" {', '.join(first).capitalize()} and {last} share it."
         beside = " + ".join(self.beside) or "the soil alone"
         text = f"The remainder beside {beside} looks like {_STAGES.get(self.stage, what)}{depends}."
-        return Remark("remainder-cause", text + shared, (self.stage,), "note")
+        return Remark("remainder-cause", text, (self.stage,), "note")
 
 
 @dataclass(frozen=True)

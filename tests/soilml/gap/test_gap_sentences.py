@@ -99,7 +99,7 @@ def test_what_is_left_says_beside_which_explanation_and_what_its_cause_is_like()
     suspects = (Suspect(("a", "b"), 0.0, 0.5),)
     parts = {"suspects": suspects, "best_unclaimed": ("a", "b")}
     parts |= {"discrepancy": LEFT | {"drawbar_pull_N": worst}}
-    cause = RemainderCause("shear stress", "slip", ("torque",), 0.95, 2.0)
+    cause = RemainderCause("shear stress", "slip", 0.95, 2.0)
     depends = (
         "The remainder beside {} looks like a change of the shear stress that depends on slip."
     )
