@@ -8,19 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.config.case import Case
-from soilml.config.compatibility import check_wheel_size
 from soilml.config.given_case import GivenCase, as_case
 from soilml.config.remainder import SAME_ROWS
 from soilml.errors import InputError, solvable
 from soilml.fitting.candidate_effects import candidate_effects, effect_names
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
-from soilml.fitting.faulty_readings import sound_rows
 from soilml.fitting.fitted_readings import FittedReadings
-from soilml.fitting.operating_points import with_rover_columns
 from soilml.fitting.predictions import forces
 from soilml.fitting.readings import Readings, stack_readings
-from soilml.fitting.row_order import with_order_columns
-from soilml.fitting.usable_readings import answered_rows, with_zeros_replaced
+from soilml.fitting.usable_readings import prepared_rows, with_zeros_replaced
 from soilml.gap.cause_of_remainder import described_cause
 from soilml.gap.checks import ONE_LOAD, estimate_repeat_noise, faults_of, naming_obstacles
 from soilml.gap.conclusions import (
@@ -161,13 +157,10 @@ def gap(
     effects = candidate_effects(case, effects)
     case = case.without_learned_discrepancy().without_explanations()
     known_costs = check_costs(costs or {})
-    table, copies = sound_rows(case, as_table(table))
+    table, remarks = prepared_rows(case, as_table(table), FROM_ORDER)
     known, case = case.remainder, case.without_remainder_of(table)
-    copies += () if case.remainder is known else (SAME_ROWS,)
-    table = with_rover_columns(case, with_order_columns(case, table, FROM_ORDER))
-    check_wheel_size(case, table)
+    remarks += [] if case.remainder is known else [SAME_ROWS]
     _check_size(table)
-    table, excluded_rows = answered_rows(table)
     split = split_holdout(table, holdout, seed)
     soil = free_soil_parameters(case, free)
 
@@ -175,7 +168,7 @@ def gap(
     readings = with_zeros_replaced(case, split.analysed, readings, refuse=False)
     repeat_noise, notes = estimate_repeat_noise(readings)
     readings, exclusions = readings.with_default_std(repeat_noise).with_known_noise()
-    notes = [*copies, *notes, *readings.notes, *exclusions, *excluded_rows]
+    notes = [*remarks, *notes, *readings.notes, *exclusions]
     if faults := tuple(faults_of(readings, len(soil))):
         return _bad_data_report(case, faults, notes, seed)
     obstacles = tuple(naming_obstacles(readings, len(soil)))
