@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeVar
 
@@ -55,18 +55,16 @@ class SetFigures:
     refused: float  # share of sets that were refused; they count with the prior
 
 
-def calibrate_misfit_limits(
-    family: WheelFamily, response: Response, progress: Progress, small: bool = False
-) -> SetPosteriorGraph:
-    """The set posterior with misfit limits that refuse at most one consistent set in a hundred.
+#: Of a set posterior before its limits are measured.
+NO_LIMITS = MisfitLimits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
 
-    small: Whether it is for a microcontroller.
-    """
-    no_limits = MisfitLimits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
-    task = partial(_misfits, SetPosteriorGraph(family, response, no_limits, small=small))
+
+def with_misfit_limits(posterior: SetPosteriorGraph, progress: Progress) -> SetPosteriorGraph:
+    """The set posterior with misfit limits that refuse at most one consistent set in a hundred."""
+    task = partial(_misfits, replace(posterior, limits=NO_LIMITS))
     found = _by_size(task, "measuring misfit", progress)
     readings, misfit = (np.concatenate(part) for part in zip(*found.values(), strict=True))
-    return SetPosteriorGraph(family, response, misfit_limits(readings, misfit), small=small)
+    return replace(posterior, limits=misfit_limits(readings, misfit))
 
 
 def _misfits(posterior: SetPosteriorGraph, rows: int) -> tuple[Floats, Floats]:
