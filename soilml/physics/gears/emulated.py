@@ -30,18 +30,12 @@ class EmulatedGear:
 
     It has no contact and no stress, so that effects act on what goes in and what comes out alone.
 
-    Attributes
-    ----------
-    radius, width
-        Of the wheel that was simulated, m.
-    inputs
-        `slip`, `load`, and parameters of the soil: those that the runs differ in.
-    lower, upper, logarithmic
-        Ends of the design, and whether an input counts by its logarithm, (d,) each.
-    channels
-        `torque`, `drawbar_pull`, `sinkage`, as far as the runs have them.
-    emulate
-        Channels (m, k) at points (m, d) of the unit cube.
+    radius, width: Of the wheel that was simulated, m.
+    inputs: `slip`, `load`, and parameters of the soil: those that the runs differ in.
+    lower, upper, logarithmic: Ends of the design, and whether an input counts by its logarithm,
+        (d,) each.
+    channels: `torque`, `drawbar_pull`, `sinkage`, as far as the runs have them.
+    emulate: Channels (m, k) at points (m, d) of the unit cube.
     """
 
     name: ClassVar[str] = "simulator"

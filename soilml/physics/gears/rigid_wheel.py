@@ -279,7 +279,7 @@ def sliced_contact(rim: WheelArc, contact_of: Callable[[WheelArc], Contact]) -> 
     for name in ("shear_lever_arm", "normal_lever_arm", "shear_direction"):
         if getattr(getattr(parts[0], name), "ndim", 0) > 1:
             fields[name] = joined([getattr(part, name) for part in parts])
-    return replace(parts[0], **fields, repeats=1, geometry=replace(rim, **angles))
+    return replace(parts[0], **fields, geometry=replace(rim, **angles))
 
 
 def _at_depth(rim: WheelArc, depth: Array) -> WheelArc:

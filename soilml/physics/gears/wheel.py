@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
@@ -120,8 +120,7 @@ def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int)
     depth = depth_at(rim, before)
     passed = xp.concat([before, (front + rear) - x * rear], axis=0)
     arc = xp.concat([weight * front, weight * rear], axis=0)
-    found = contact_at(rim, at, passed, xp.concat([depth, depth], axis=0), arc, law)
-    return replace(found, repeats=2)
+    return contact_at(rim, at, passed, xp.concat([depth, depth], axis=0), arc, law)
 
 
 def _braking_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) -> Contact:
