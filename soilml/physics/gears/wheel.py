@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
-from soilml.numerics.quadrature import columns, crowded_ends, crowded_start
+from soilml.numerics.quadrature import between, columns, crowded_start
 from soilml.physics.contact import SMALLEST_DEPTH, Contact, Resolution
 from soilml.physics.gears.flat_rim import flat_rim_contact, flat_rim_points
 from soilml.physics.gears.rigid_wheel import (
@@ -98,14 +98,11 @@ class Wheel(RigidWheel):
             angle = geometry.entry - fraction * arc
             none = xp.zeros_like(angle)
             return angle, flat_rim_points(geometry, at, self.braking, angle, none)
-        front, rear = geometry.entry - geometry.peak, geometry.peak - geometry.exit
         passed = fraction * arc
-        mirrored = (1.0 - fraction) * arc * (front / rear)
-        depth = depth_at(geometry, xp.where(passed <= front, passed, mirrored))
+        angle = geometry.entry - passed
+        depth = pressed_depth(geometry, angle)
         none = xp.zeros_like(passed)
-        depth = xp.maximum(depth, none + SMALLEST_DEPTH)
-        contact = contact_at(geometry, at, passed, depth, none, self.braking)
-        return geometry.entry - passed, contact
+        return angle, contact_at(geometry, at, passed, depth, none, self.braking)
 
 
 def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) -> Contact:
@@ -124,33 +121,17 @@ def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int)
 
 
 def _braking_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) -> Contact:
-    """Parts that end where shear displacement changes its direction and the shear curve bends.
-
-    Points are measured backward from the entry. The pressure behind the maximum is that at the
-    mirrored angle before it.
-    """
-    xp = namespace(rim.entry)
-    x, weight = columns(crowded_ends(count), rim.entry)
-    ends = xp.stack(_braking_part_ends(rim, 1.0 - rim.travelled(at.slip, law)), axis=0)
-    low, length = ends[:-1, None, :], (ends[1:, :] - ends[:-1, :])[:, None, :]  # (parts, 1, batch)
-    mirrored = (low - rim.exit + (1.0 - x) * length) * (
-        (rim.entry - rim.peak) / (rim.peak - rim.exit)
-    )
-    passed = rim.entry - (low + length) + x * length
-    depth = depth_at(rim, xp.where(low < rim.peak, mirrored, passed))
-
-    def points(value: Array) -> Array:
-        return xp.reshape(value, (length.shape[0] * count, -1))
-
-    depth = points(xp.maximum(depth, xp.full_like(depth, SMALLEST_DEPTH)))
-    return contact_at(rim, at, points(passed), depth, points(weight * length), law)
+    """Parts that end where shear displacement changes its direction and the shear curve bends."""
+    inner = _braking_part_ends(rim, 1.0 - rim.travelled(at.slip, law))
+    angle, arc = between(rim.exit, inner, rim.entry, count)
+    return contact_at(rim, at, rim.entry - angle, pressed_depth(rim, angle), arc, law)
 
 
 def _braking_part_ends(rim: WheelArc, slip: Array) -> list[Array]:
-    """Angles (rad) from exit to entry that bound the parts of a braking wheel's contact.
+    """Angles (rad) between exit and entry that bound the parts of a braking wheel's contact.
 
-    Between exit and entry they are the maximum stress and the reversal of shear displacement; a
-    second reversal is added if any row has one, where the rim reaches far behind the axle. Rows
+    They are the maximum stress and the reversal of shear displacement; a second
+    reversal is added if any row has one, where the rim reaches far behind the axle. Rows
     without a reversal take an angle that divides the longer part, or the lowest, in halves, or one
     close to the entry where the wheel is nearly locked. `slip` is that of the shear displacement.
     """
@@ -165,8 +146,7 @@ def _braking_part_ends(rim: WheelArc, slip: Array) -> list[Array]:
     if bool(xp.any(exists[1, :])):
         below = 0.5 * (rim.exit + xp.minimum(*inner))
         inner.append(xp.where(exists[1, :], reversal[1, :], below))
-    ordered = xp.sort(xp.stack(inner, axis=0), axis=0)
-    return [rim.exit, *(ordered[i, :] for i in range(len(inner))), rim.entry]
+    return inner
 
 
 def depth_at(rim: WheelArc, passed: Array) -> Array:
@@ -176,6 +156,17 @@ def depth_at(rim: WheelArc, passed: Array) -> Array:
     t = xp.tan(0.5 * passed)
     u = 2.0 * t / (1.0 + t * t)
     return rim.radius * u * (xp.sin(rim.entry) - t * xp.cos(rim.entry))
+
+
+def pressed_depth(rim: WheelArc, angle: Array) -> Array:
+    """Depth (m) that sets the pressure at angles (rad): behind the maximum, that before it.
+
+    The mirrored angle is at the same fraction of the way from the entry to the maximum.
+    """
+    xp = namespace(angle)
+    mirrored = (angle - rim.exit) * ((rim.entry - rim.peak) / (rim.peak - rim.exit))
+    depth = depth_at(rim, xp.where(angle < rim.peak, mirrored, rim.entry - angle))
+    return xp.maximum(depth, xp.full_like(depth, SMALLEST_DEPTH))
 
 
 def contact_at(
