@@ -151,6 +151,12 @@ class WheelArc:
     chord: Array | None = None  # rad, half angle of the part that lies flat; None: a full circle
     tilt: Array | None = None  # m, half the difference in depth of two slices; None: upright
 
+    def with_entry(self, entry: Array, **changes: Any) -> WheelArc:
+        """The arc with another entry angle, of which the other angles keep their share."""
+        share = entry / self.entry
+        angles = {"peak": self.peak * share, "exit": self.exit * share}
+        return replace(self, entry=entry, **angles | changes)
+
     def travelled(self, slip: Array, law: BrakingLaw) -> Array:
         """Travel of the axle over that of the shearing surface, of slip ratios (batch,)."""
         return (1.0 - displacement_slip(slip, law)) * self.travel
@@ -284,5 +290,4 @@ def sliced_contact(rim: WheelArc, contact_of: Callable[[WheelArc], Contact]) -> 
 
 def _at_depth(rim: WheelArc, depth: Array) -> WheelArc:
     share = entry_angle(depth, rim.radius) / entry_angle(rim.sinkage, rim.radius)
-    angles = {name: getattr(rim, name) * share for name in _ANGLES}
-    return replace(rim, **angles, sinkage=depth, tilt=None)
+    return rim.with_entry(rim.entry * share, sinkage=depth, tilt=None)
