@@ -7,14 +7,15 @@ from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
 from soilml.numerics.quadrature import between, columns, crowded_start
-from soilml.physics.contact import SMALLEST_DEPTH, Contact, Resolution
+from soilml.physics.contact import Contact, Resolution
 from soilml.physics.gears.flat_rim import flat_rim_contact, flat_rim_points
 from soilml.physics.gears.rigid_wheel import (
     BrakingLaw,
     RigidWheel,
     WheelArc,
-    differences_from_entry,
-    displacement_direction,
+    contact_at,
+    depth_at,
+    pressed_depth,
     reversals,
     sliced_contact,
 )
@@ -147,51 +148,3 @@ def _braking_part_ends(rim: WheelArc, slip: Array) -> list[Array]:
         below = 0.5 * (rim.exit + xp.minimum(*inner))
         inner.append(xp.where(exists[1, :], reversal[1, :], below))
     return inner
-
-
-def depth_at(rim: WheelArc, passed: Array) -> Array:
-    """Depth (m) below the free surface of points of the rim, by the angle passed since entry."""
-    xp = namespace(passed)
-    # r (cos(theta) - cos(theta_1)), as in `differences_from_entry`
-    t = xp.tan(0.5 * passed)
-    u = 2.0 * t / (1.0 + t * t)
-    return rim.radius * u * (xp.sin(rim.entry) - t * xp.cos(rim.entry))
-
-
-def pressed_depth(rim: WheelArc, angle: Array) -> Array:
-    """Depth (m) that sets the pressure at angles (rad): behind the maximum, that before it.
-
-    The mirrored angle is at the same fraction of the way from the entry to the maximum.
-    """
-    xp = namespace(angle)
-    mirrored = (angle - rim.exit) * ((rim.entry - rim.peak) / (rim.peak - rim.exit))
-    depth = depth_at(rim, xp.where(angle < rim.peak, mirrored, rim.entry - angle))
-    return xp.maximum(depth, xp.full_like(depth, SMALLEST_DEPTH))
-
-
-def contact_at(
-    rim: WheelArc, at: Operating, passed: Array, depth: Array, arc: Array, law: BrakingLaw
-) -> Contact:
-    """Contact at points given by the angle passed since entry (rad); all arrays (points, batch).
-
-    `depth` (m) sets the pressure, `arc` (rad) is the angle that a point represents.
-    """
-    xp = namespace(passed)
-    sin_entry, cos_entry = xp.sin(rim.entry), xp.cos(rim.entry)
-    sin_difference, cos_difference = differences_from_entry(sin_entry, cos_entry, passed)
-    travelled = rim.travelled(at.slip, law)
-    displacement = rim.shear_radius * (passed - travelled * sin_difference)
-    area = rim.radius * rim.width * arc
-    return Contact(
-        depth=depth,
-        shear_displacement=displacement,
-        surface_travel=rim.shear_radius * passed,
-        area=area,
-        horizontal_area=area * (cos_entry + cos_difference),
-        frontal_area=area * (sin_entry - sin_difference),
-        shear_lever_arm=rim.lever,
-        width=rim.width,
-        shear_direction=displacement_direction(displacement, at.slip, law),
-        travel_ratio=travelled,
-        geometry=rim,
-    )

@@ -10,8 +10,13 @@ from soilml.arrays import Array, Real, namespace
 from soilml.numerics.quadrature import between
 from soilml.parameters import Parameter
 from soilml.physics.contact import Contact, Resolution
-from soilml.physics.gears.rigid_wheel import WheelArc, entry_angle, reversals
-from soilml.physics.gears.wheel import contact_at, pressed_depth
+from soilml.physics.gears.rigid_wheel import (
+    WheelArc,
+    contact_at,
+    entry_angle,
+    pressed_depth,
+    reversals,
+)
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from soilml.row_status import Status
