@@ -18,7 +18,7 @@ List the catalogue of published soils. Values are in SI units; * marks a value
 that is not printed in the paper and is assumed.
 
   soilml show soils                      all soils, one line each
-  soilml show soils wong1989/dry_sand    one soil, with its source and every value
+  soilml show soils wong1989/dry_sand    one soil, its source and all values
 """
 ARGUMENTS = (("name", "PAPER/SOIL, the name of the soil to show", OPTIONAL),)
 
