@@ -198,7 +198,7 @@ class Fit(Result):
         count = f"{self.rows_used} row{'' if self.rows_used == 1 else 's'}"
         if against:
             size = f" ({significant(float(np.sqrt(self.misfit)), 2)} times the noise; p < 0.001)"
-            known = against[0] == AGAINST_EXACT[0]
+            known = AGAINST_EXACT[0] in against
             return f"The model does not fit these rows{size if known else ''}: run `soilml gap`."
         fits = "" if np.isnan(self.misfit) else "The model fits these rows; "
         few = [remark.text for remark in self.warnings if remark.code == "few-readings"]

@@ -77,7 +77,7 @@ def test_a_drift_of_the_soil_is_an_explanation_where_the_order_of_the_rows_is_kn
 def test_rows_that_nothing_explains_are_said_to_be_so():
     rng = np.random.default_rng(1)
     fit = identify(CASE, rows(factor=rng.uniform(0.3, 1.7, len(SLIP))))
-    assert not fit.fits and fit.verdict.startswith("The model does not fit these rows")
+    assert not fit.fits and fit.verdict.startswith("The model does not fit these rows (")
 
 
 @pytest.mark.slow

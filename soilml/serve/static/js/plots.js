@@ -70,6 +70,7 @@ export class Plot {
     const ctx = u.ctx, dot = devicePixelRatio || 1;
     ctx.save();
     ctx.beginPath();
+    ctx.setLineDash([]); // what drew the lines may leave dashes behind
     ctx.arc(u.valToPos(x, "x", true), u.valToPos(y, "y", true), 5 * dot, 0, 2 * Math.PI);
     ctx.fillStyle = colour(name);
     ctx.strokeStyle = colour("panel");
