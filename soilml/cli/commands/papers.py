@@ -18,7 +18,7 @@ FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
 Compute the numbers that the source papers print, and compare them.
 
-  soilml paper numbers                  all papers; about forty seconds
+  soilml paper numbers                  all papers; about ten seconds
   soilml paper numbers nagatani2009     one paper
   soilml paper numbers --summary        how many numbers of each status
   soilml paper numbers comin2017 --all  every number, also those not computed
