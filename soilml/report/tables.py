@@ -195,14 +195,15 @@ class ReportTable:
             every = [table.columns[k] for table in parts]
             units = [_of_rows(c) for c in every]
             ends = [[v for c in every if c.ends for v in c.ends[end]] for end in (0, 1)]
-            joined = {
+            joined: dict[str, Any] = {
                 name: _chained(getattr(c, name) for c in every)
                 for name in ("values", "std", "sizes")
                 if getattr(own, name) is not None
             }
             unit = own.unit if isinstance(own.unit, str) else _chained(units)
-            more = {"ends": (ends[0], ends[1])} if own.ends else {}
-            columns.append(replace(own, unit=unit, **joined, **more))
+            if own.ends:
+                joined["ends"] = ends[0], ends[1]
+            columns.append(replace(own, unit=unit, **joined))
         return replace(first, columns=columns)
 
     def cells(self) -> tuple[list[str], list[list[str]], list[bool]]:
