@@ -43,7 +43,7 @@ class Uploads:
         if size > LARGEST_FILE:
             raise InputError(
                 f"{plain_name(name)} has {size / 2**20:.0f} MB; at most {LARGEST_FILE >> 20} MB "
-                "are taken here: thin it, or use `soilml import` on the command line"
+                "are accepted: thin it, or use `soilml import` on the command line"
             )
         if sum(upload.size for upload in self._files.values()) + size > LARGEST_SUM:
             raise InputError(

@@ -28,7 +28,7 @@ which column or topic is which quantity, in which unit, and what stands
 between: radius, gear ratio, torque constant, tare, each with its uncertainty.
 --init writes one with guesses and their reasons; without --out it prints it. A
 guess that neither its name and unit nor another channel supports is marked
-with CHANGE; --explain prints what speaks for each.
+with CHANGE; --explain prints the evidence.
 
 Beside RUNS.csv stand RUNS.report.html (pictures, what was left out and why),
 RUNS.report.json, and RUNS.bias.toml: the errors that all rows share, as [bias]
@@ -39,7 +39,7 @@ _MOST_NAMED = 4  # Most logs that the next command names
 ARGUMENTS = (
     ("files LOG", "logs, of any kind", InputFile, SEVERAL),
     ("--init", "write a commented map with guesses, and no table"),
-    ("--explain", "with --init: print what speaks for each guess"),
+    ("--explain", "with --init: print the evidence for each guess"),
     ("--map MAP.toml", "how the logs are read", InputFile),
     ("--out RUNS.csv", "write table and report; with --init, the map"),
     ("--accept", "import although the map looks wrong"),
@@ -55,7 +55,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
             raise InputError(f"{args.out} exists; --init would overwrite it: give another name")
         return output_files(args.out, ".toml")
     if args.explain:
-        raise InputError("--explain prints what speaks for each guess of --init; give both")
+        raise InputError("--explain prints the evidence for each guess of --init; give both")
     if args.map is None:
         raise InputError("--map is missing; soilml import --init LOG... --out MAP.toml writes one")
     # `import *.csv` a second time finds the table of the first time among the logs
