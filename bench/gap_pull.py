@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
@@ -100,8 +100,7 @@ def judged(asked: Row) -> Row:
 def _bands(model: Case, rows: Table, slip: Any, load: Any, known: Row) -> Any:
     """Ends (2, n) of the 90 % bands of pull at slips and loads (n,), as `pull` draws them."""
     soil = measured_soil(model, rows)
-    errors = soil.errors(slip, load, ("drawbar_pull",))
-    draws = soil.draws if errors is None else replace(soil.draws, errors=errors[0])
+    draws, _ = soil.with_errors(slip, load, ("drawbar_pull",))
     count = len(draws.values)
     draw, at = (grid.ravel() for grid in np.indices((count, len(slip))))
     there = Operating(slip=slip[at], load=load[at], **known)

@@ -84,10 +84,10 @@ def cross_fit(spec: Spec, data: Dataset, prior: PriorSummary, progress: Progress
         scores[regressor.name] = compute_metrics(truth, mean[some], stds[-1][some], prior.std)
     estimator, mean, std = members[0], means[0], stds[0]
     if len(members) > 1:
-        own_means, own_stds = (np.stack(own)[:, some] for own in (means, stds))
-        fused = fuse_members(members, own_means, own_stds, truth)
+        own_means, own_stds = ([part[some] for part in own] for own in (means, stds))
+        fused = fuse_members(members, np.stack(own_means), np.stack(own_stds), truth)
         estimator = calibrated(fused, *fused.combine(own_means, own_stds), truth)
-        mean, std = fused.combine(np.stack(means), np.stack(stds))
+        mean, std = fused.combine(means, stds)
         std = std * estimator.std_scale
     scores["estimator"] = compute_metrics(truth, mean[some], std[some], prior.std)
     return CrossFit(estimator, tuple(members), _left_out(mean, std, data, some, prior, few), scores)

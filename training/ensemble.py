@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.onboard.fusion_rules import best_linear, shrink_correlation
 from training.calibration.recalibration import CalibratedRegressor
-from training.onnx_graph.value import Value, concat, sqrt
+from training.onnx_graph.value import Tensor, Value, concat, sqrt
 
 #: Rows of which correlations are shrunk entirely; by a share of this number over theirs beyond.
 SHRUNK_ROWS = 10.0
@@ -30,25 +31,23 @@ class Ensemble:
     def predict(self, features: Floats, return_std: bool = True) -> tuple[Floats, Floats]:
         """Mean and standard deviation (n, q) before recalibration."""
         means, stds = zip(*(member.predict(features) for member in self.members), strict=True)
-        return self.combine(np.stack(means), np.stack(stds))
-
-    def combine(self, mean: Floats, std: Floats) -> tuple[Floats, Floats]:
-        """The same from the members' means and standard deviations (m, n, q)."""
-        weighted = self.weights[:, None, :] * std
-        variance = np.einsum("inq,qij,jnq->nq", weighted, self.correlation, weighted)
-        return (self.weights[:, None, :] * mean).sum(axis=0), np.sqrt(variance)
+        return self.combine(means, stds)
 
     def add_to_graph(self, features: Value) -> tuple[Value, Value]:
-        r"""Add all members and their combination to an ONNX graph; mean and std, (n, q).
-
-        .. math:: \mu = \sum_i w_i \mu_i, \qquad
-            \sigma^2 = \sum_i \sum_j w_i w_j \sigma_i \sigma_j \rho_{ij}
-        """
+        """Add all members and their combination to an ONNX graph; mean and std, (n, q)."""
         means, stds = [], []
         for member in self.members:
             mean, std = member.regressor.add_to_graph(features)
             means.append(mean)
             stds.append(std * member.std_scale)
+        return self.combine(means, stds)
+
+    def combine(self, means: Sequence[Tensor], stds: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
+        r"""Mean and standard deviation (n, q) from those of the m members.
+
+        .. math:: \mu = \sum_i w_i \mu_i, \qquad
+            \sigma^2 = \sum_i \sum_j w_i w_j \sigma_i \sigma_j \rho_{ij}
+        """
         m, q = self.weights.shape
         # one product sums estimates, and one the products of all pairs of their standard deviations
         quantity, columns = np.arange(q), np.arange(m * q).reshape(m, q)

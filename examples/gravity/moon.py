@@ -23,7 +23,8 @@ from soilml.report.aligned_text import format_table
 from soilml.report.figure_style import save_png
 from soilml.traction import Traction, predict_traction
 from soilml.traction.gravity import draws_at_gravity
-from soilml.traction.pull_and_slope import MeasuredRange, predictions_by_load, slip_grid
+from soilml.traction.measured_range import MeasuredRange, slip_grid
+from soilml.traction.pull_and_slope import predictions_by_load
 from soilml.traction.soil_draws import measured_soil
 
 HERE, OUT = Path(__file__).parent, Path("demo/gravity/moon.png")

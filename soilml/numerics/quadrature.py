@@ -16,12 +16,6 @@ from soilml.arrays import Array, namespace
 
 Nodes = tuple[NDArray[np.float64], NDArray[np.float64]]
 
-#: Terms of each series: the first that is left out is below 1e-15 of the sum at an angle of pi, and
-#: below 3e-7 in single precision.
-TERMS, SINGLE_TERMS = 13, 8
-#: Coefficients below this have no effect; some would be subnormal numbers, which are slow.
-NEGLIGIBLE = 1e-30
-
 
 @cache
 def crowded_start(count: int) -> Nodes:
@@ -52,47 +46,3 @@ def columns(nodes: Nodes, like: Array) -> tuple[Array, Array]:
         xp.asarray(x[:, None], dtype=like.dtype, device=like.device),
         xp.asarray(weight[:, None], dtype=like.dtype, device=like.device),
     )
-
-
-def sine_and_versine(nodes: Nodes, angle: Array) -> tuple[Array, Array]:
-    r"""Sine, and one less cosine, of the fractions x of each angle.
-
-    .. math::
-        \sin(x \alpha) = \sum_{i=0} (-1)^i \frac{x^{2 i + 1}}{(2 i + 1)!} \alpha^{2 i + 1}, \quad
-        1 - \cos(x \alpha) = \sum_{i=0} (-1)^i \frac{x^{2 i + 2}}{(2 i + 2)!} \alpha^{2 i + 2}
-
-    Each sum is the product of a matrix of the nodes with one of the powers of the angles, several
-    times faster than the functions themselves; both keep their relative accuracy at small angles.
-
-    nodes: The fractions, in [0, 1], from a function of `soilml.numerics.quadrature`.
-    angle (parts, batch): Angles (rad) from 0 to pi.
-
-    Returns: Sine and versine, (parts, len(fractions), batch) each.
-    """
-    xp = namespace(angle)
-    count = TERMS if angle.dtype == xp.float64 else SINGLE_TERMS
-    of_sine, of_versine = (
-        xp.asarray(terms, dtype=angle.dtype, device=angle.device)
-        for terms in _coefficients(tuple(nodes[0].tolist()), count)
-    )
-    square = angle * angle
-    powers = [xp.ones_like(angle)]
-    for _ in range(count - 1):
-        powers.append(powers[-1] * square)
-    even = xp.stack(powers, axis=1)  # (parts, terms, batch)
-    odd = even * angle[:, None, :]
-    return of_sine @ odd, of_versine @ (odd * angle[:, None, :])
-
-
-@cache
-def _coefficients(
-    fractions: tuple[float, ...], count: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Coefficients of the powers of an angle in both sums, (len(fractions), count)."""
-    x = np.asarray(fractions)[:, None]
-    order = np.arange(1, 2 * count + 1)
-    factorial = np.cumprod(order.astype(np.float64))
-    sign = np.where((order - 1) // 2 % 2 == 0, 1.0, -1.0)
-    terms = sign * x**order / factorial
-    terms = np.where(np.abs(terms) < NEGLIGIBLE, 0.0, terms)
-    return np.ascontiguousarray(terms[:, 0::2]), np.ascontiguousarray(terms[:, 1::2])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -344,15 +344,18 @@ class Estimate(Result):
             return f"The readings do not determine {', '.join(vague)}; they determine the rest."
         return "The readings determine all quantities."
 
-    def report(self) -> Report:
-        """The verdict, each quantity of a single estimate, and intervals beside the prior."""
+    def report(self, labels: Sequence[str] | None = None) -> Report:
+        """The verdict, each quantity of a single estimate, and intervals beside the prior.
+
+        Readings are labelled by their number, or by `labels`.
+        """
         from soilml.report.column_figure import ParameterIntervals
         from soilml.report.report import Report
         from soilml.report.tables import ReportTable
 
         q, columns = len(self.names), self.frame_columns()
         mean, low, high = (v.reshape(-1, q) for v in (self.mean, self.low, self.high))
-        labels = [str(i) for i in range(1, len(mean) + 1)]
+        labels = labels or [str(i) for i in range(1, len(mean) + 1)]
         ends = self.prior.lower, self.prior.upper
         drawn = ParameterIntervals(self.names, self.units, labels, mean, low, high, *ends)
         one = "quantity" in columns
@@ -367,11 +370,6 @@ class Estimate(Result):
             title="Estimate",
         )
 
-    def _rows(self) -> Iterable[tuple[Any, ...]]:
-        q = len(self.names)
-        parts = (self.mean, self.std, self.low, self.high)
-        return zip(self.names, self.units, *(x.reshape(-1, q)[0] for x in parts), strict=True)
-
     def frame_columns(self) -> dict[str, Any]:
         """A row for each quantity of a single estimate; for each reading of several.
 
@@ -379,9 +377,8 @@ class Estimate(Result):
         ends in _std, _p05 and _p95, with the unit in the name.
         """
         if np.ndim(self.in_range) == 0:
-            keys = ("quantity", "unit", "mean", "std", "low", "high")
-            found = dict(zip(keys, zip(*self._rows(), strict=True), strict=True))
-            return {key: list(found[key]) for key in (*keys[:1], *keys[2:], "unit")}
+            parts = {key: list(getattr(self, key)) for key in ("mean", "std", "low", "high")}
+            return {"quantity": list(self.names), **parts, "unit": list(self.units)}
         columns: dict[str, Any] = {"reading": np.arange(np.size(self.in_range))}
         return columns | self.reading_columns()
 

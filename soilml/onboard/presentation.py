@@ -11,11 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.onboard.estimate import Estimate, Reason
+from soilml.io.table import ALL, Table
+from soilml.onboard.estimate import Reason
 from soilml.onboard.estimator import Estimator
-from soilml.quantities import NOT_IDENTIFIED_ABOVE, column
+from soilml.onboard.set_contract import INFERRED, MODEL_ERROR_INPUT, OPERATING_NOISE
+from soilml.onboard.table_estimates import (
+    ERRORS_SHOWN,
+    TableEstimates,
+    complete_rows,
+    joint_readings,
+    sensor_errors_shown,
+)
+from soilml.quantities import CHANNELS, NOT_IDENTIFIED_ABOVE, column
 from soilml.remarks import NEXT_ROW, Remark
-from soilml.report.column_figure import ParameterIntervals
 from soilml.report.numbers import shown_unit, significant
 from soilml.report.report import Report
 from soilml.report.tables import ReportTable
@@ -69,13 +77,6 @@ def _prior_text(low: float, high: float, unit: str) -> str:
     return f"{significant(factor * low)} to {significant(factor * high)} {shown}".rstrip()
 
 
-def estimate_columns(estimate: Estimate) -> dict[str, NDArray[np.float64]]:
-    """Mean, std and interval of every parameter, by column name."""
-    columns = estimate.reading_columns()
-    del columns["in_range"]
-    return columns
-
-
 def verdict(columns: Mapping[str, Any], by: str | None, remarks: Sequence[Remark]) -> str:
     """How many rows or groups are estimated, and what they do not determine, in one sentence."""
     known = np.asarray(columns["in_range"])
@@ -89,28 +90,53 @@ def verdict(columns: Mapping[str, Any], by: str | None, remarks: Sequence[Remark
     return f"{head}; {names} mostly from the prior." if vague else f"{head}."
 
 
-def _relative_width(estimate: Estimate) -> NDArray[np.float64]:
-    """RMS over the parameters of posterior width / prior width, (rows,); NaN out of range."""
-    widths = np.sqrt(np.mean((estimate.std / estimate.prior_std) ** 2, axis=1))
-    return np.where(estimate.in_range, widths, np.nan)
+def _words(name: str) -> str:
+    return name.replace("_", " ")
 
 
-def median_row(estimate: Estimate) -> int:
-    """The row in range with the median width."""
-    widths = _relative_width(estimate)
-    return int(np.argsort(widths)[(int(estimate.in_range.sum()) - 1) // 2])
+def typical(found: TableEstimates) -> int | None:
+    """The row in range of median width, or the widest group; None where none is in range."""
+    inside = found.answered & found.estimate.in_range
+    width = np.mean((found.estimate.std / found.estimate.prior_std) ** 2, axis=1)
+    order = np.argsort(np.where(inside, width, np.inf))[: int(inside.sum())]
+    if not order.size:
+        return None
+    return int(order[-1] if found.by is not None else order[(order.size - 1) // 2])
 
 
-def widest_row(estimate: Estimate) -> int:
-    """The row in range with the largest width."""
-    return int(np.nanargmax(_relative_width(estimate)))
+def remarks_on(found: TableEstimates, estimators: Sequence[Estimator]) -> list[Remark]:
+    """What to know of estimates: what they use and do not determine, and rows without one."""
+    first, table, by = estimators[0], found.table, found.by
+    remarks = [] if by is None else _channel_remarks(first, table)
+    remarks += _width_remarks(found)
+    if found.rule is not None:
+        remarks.append(Remark("fused", f"fused by the rule {found.rule}", severity="note"))
+    remarks += _row_refusals(found) if by is None else _group_refusals(found)
+    if by is None or first.sets is None:
+        remarks += _unused_std_remarks(first, table)
+    some = np.any([complete_rows(estimator, table) for estimator in estimators], axis=0)
+    unanswered = some & ~table.answered
+    remarks += _excluded_rows(table, ~some, "missing-reading", "lack a reading")
+    return remarks + _excluded_rows(
+        table, unanswered, "status-not-ok", "have a status that is not ok"
+    )
 
 
-def width_remarks(estimate: Estimate, what: str, does: str, hint: str) -> list[Remark]:
+def _width_remarks(found: TableEstimates) -> list[Remark]:
     """Median width of the estimates in range over the prior's; parameters not determined."""
-    if not estimate.in_range.any():
+    estimate, by = found.estimate, found.by
+    inside = found.answered & estimate.in_range
+    if not inside.any():
         return []
-    share = np.median(estimate.std[estimate.in_range], axis=0) / estimate.prior_std
+    what, does, hint = "a single row", "does", "pool rows with --by run"
+    if by is None and found.estimator.per_row:
+        hint = "measure with other sensors too, or train for a narrower prior of the soil,"
+    if by is not None:
+        what, does = "all rows" if by == ALL else f"all rows of a {by}", "do"
+        hint = "measure other loads and slips"
+        if by != ALL and found.answered.sum() > 1:
+            hint += f", or take those of one soil together, such as --by {ALL},"
+    share = np.median(estimate.std[inside], axis=0) / estimate.prior_std
     shares = ", ".join(f"{_words(n)} {s:.0%}" for n, s in zip(estimate.names, share, strict=True))
     text = f"posterior width / prior width, {what}: {shares}"
     remarks = [Remark("width", text, estimate.names, "note")]
@@ -124,56 +150,93 @@ def width_remarks(estimate: Estimate, what: str, does: str, hint: str) -> list[R
     return remarks
 
 
-def _words(name: str) -> str:
-    return name.replace("_", " ")
+def _channel_remarks(estimator: Estimator, table: Table) -> list[Remark]:
+    """Notes on the channels and errors that a file uses which can use more than it requires."""
+    if estimator.sets is None:
+        return []
+    usable = complete_rows(estimator, table) & table.answered
+    readings = joint_readings(estimator, table.rows(usable))
+    rows = {name: int(np.isfinite(readings[name]).sum()) for name in CHANNELS if name in readings}
+    used = {name: count for name, count in rows.items() if count}
+    said = ", ".join(f"{_words(name)} ({count} rows)" for name, count in used.items())
+    remarks = [Remark("channels-used", f"uses slip, load and {said}", tuple(used), "note")]
+    errors = estimator.sets.common_errors
+    stds = {n: std for n, std in errors.items() if std > 0.0 and n in ERRORS_SHOWN}
+    if stds:
+        text = "assumes that all rows share errors with standard deviations of "
+        text += sensor_errors_shown(stds)
+        remarks.append(Remark("shared-errors", text, tuple(stds), "note"))
+    size = errors.get(MODEL_ERROR_INPUT, 0.0)
+    if size == INFERRED:
+        text = "errors of the model are included, of a size that follows from the residuals"
+    elif size:
+        text = f"errors of the model are included, {size:g} times the usual ones"
+    else:
+        text = "a perfect model is assumed, or one with the errors that the case states"
+    return [*remarks, Remark("model-errors", text, severity="note")]
 
 
-def refusal_remarks(
-    by: str,
-    names: Sequence[Any],
-    outside: NDArray[np.int64],
-    rows: NDArray[np.int64],
-    estimate: Estimate,
-) -> list[Remark]:
-    """Why runs (n,) are not in range, and what their estimate is then; rows that were set aside.
+def _row_refusals(found: TableEstimates) -> list[Remark]:
+    """How many rows are out of range."""
+    outside = int(np.count_nonzero(found.answered & ~found.estimate.in_range))
+    if not outside:
+        return []
+    why = "" if found.files is None else ", or the files contradict each other there"
+    text = f"{outside} of {int(found.answered.sum())} rows are out of range{why}: "
+    return [Remark("out-of-range", f"{text}their estimate is the prior")]
 
-    `outside` and `rows` are the rows out of range, and all rows, of each.
-    """
-    found = []
-    for i, name in enumerate(names):
-        reason, aside = Reason(int(estimate.reason[i])), bool(outside[i])
-        of_rows = f"{outside[i]} of {rows[i]} rows are out of range"
+
+def _group_refusals(found: TableEstimates) -> list[Remark]:
+    """Why groups are not in range, and what their estimate is then; rows that were set aside."""
+    runs: dict[Remark, list[str]] = {}
+    estimate = found.estimate
+    for i in np.flatnonzero(found.answered).tolist():
+        reason, aside = Reason(int(estimate.reason[i])), int(estimate.rows_set_aside[i])
+        of_rows = f"{aside} of {found.rows[i]} rows are out of range"
+        said = []
         if reason == Reason.ESTIMATED and aside:
             text = f"{of_rows}; they are set aside, and the estimate is that of the others"
-            found.append((name, Remark("rows-set-aside", text, severity="note")))
+            said.append(Remark("rows-set-aside", text, severity="note"))
         if estimate.disagrees[i] and reason != Reason.INCONSISTENT:
-            found.append((name, Remark("rows-disagree", DISAGREES)))
-        if reason == Reason.ESTIMATED:
-            continue
-        why, what = reason.words, "the estimate is the prior"
-        if reason == Reason.OUT_OF_RANGE:
-            why = of_rows
-        if reason == Reason.INCONSISTENT:
-            what = "the estimate is widened as far as the misfit says"
-        code = reason.name.lower().replace("_", "-")
-        found.append((name, Remark(code, f"{why}; {what}")))
-    return remarks_on_runs(by, found)
-
-
-def remarks_on_runs(by: str, found: Sequence[tuple[Any, Remark]]) -> list[Remark]:
-    """The remarks with the names of their runs: one each, or one for many runs with the same."""
-    runs: dict[Remark, list[str]] = {}
-    for name, remark in found:
-        runs.setdefault(remark, []).append(str(name))
+            said.append(Remark("rows-disagree", DISAGREES))
+        if reason != Reason.ESTIMATED:
+            why = of_rows if reason == Reason.OUT_OF_RANGE else reason.words
+            what = "the estimate is the prior"
+            if reason == Reason.INCONSISTENT:
+                what = "the estimate is widened as far as the misfit says"
+            said.append(Remark(reason.name.lower().replace("_", "-"), f"{why}; {what}"))
+        for remark in said:
+            runs.setdefault(remark, []).append(str(found.names[i]))
     remarks = []
     for remark, names in runs.items():
         heads: dict[str, tuple[str, ...]] = {name: (name,) for name in names}
         if len(names) > MOST_LINES:
             heads = {f"{', '.join(names[:3])} and {len(names) - 3} more": tuple(names)}
         remarks += [
-            replace(remark.under(f"{by} {head}: "), about=about) for head, about in heads.items()
+            replace(remark.under(f"{found.by} {head}: "), about=about)
+            for head, about in heads.items()
         ]
     return remarks
+
+
+def _unused_std_remarks(estimator: Estimator, table: Table) -> list[Remark]:
+    """A note on columns of standard deviations that estimates of single rows do not use."""
+    spreads = [f"{column(name)}_std" for name in (*CHANNELS, *OPERATING_NOISE)]
+    given = tuple(key for key in spreads if key in table)
+    if not given or (estimator.sets is not None and estimator.sets.sets_only):
+        return []
+    hint = "give --by" if estimator.sets is not None else "train a file with [set_posterior]"
+    text = f"estimates of single rows do not use {', '.join(given)}; {hint} to have them used"
+    return [Remark("unused-std", text, given, "note")]
+
+
+def _excluded_rows(table: Table, rows: NDArray[np.bool_], code: str, why: str) -> list[Remark]:
+    """A remark on rows that get no estimate: how many, the reason, and the first three."""
+    if not rows.any():
+        return []
+    some = ", ".join(str(table.place(int(i))) for i in np.flatnonzero(rows)[:3])
+    more = ", ..." if rows.sum() > 3 else ""
+    return [Remark(code, f"{int(rows.sum())} rows {why} and get no estimate: {some}{more}")]
 
 
 def check_size(rows: int) -> None:
@@ -186,45 +249,24 @@ def check_size(rows: int) -> None:
 
 
 def estimate_report(
-    columns: Mapping[str, Any],
-    remarks: Sequence[Remark],
-    estimator: Estimator,
-    by: str | None,
-    title: str = "Estimates",
+    found: TableEstimates, columns: Mapping[str, Any], remarks: Sequence[Remark], title: str
 ) -> Report:
-    """The report of estimates in columns (n,), a row of the table or a group each."""
-    names, prior, group = estimator.names, estimator.prior, by or "row"
-    values, low, high = (
-        np.stack([np.asarray(columns[column(n) + part], float) for n in names], axis=1)
-        for part in ("", "_p05", "_p95")
-    )
-    labels = np.asarray(columns[by] if by else np.arange(1, len(values) + 1)).astype(np.str_)
-    inside = np.nan_to_num(np.asarray(columns["in_range"], float)) > 0.5
-    answered = np.isfinite(values).any(axis=1)
-    outside = int(np.count_nonzero(answered & ~inside))
-    drawn = ParameterIntervals(
-        names=names,
-        units=estimator.units,
-        labels=labels[answered].tolist(),
-        values=values[answered],
-        low=low[answered],
-        high=high[answered],
-        prior_low=prior.lower,
-        prior_high=prior.upper,
-    )
-    status = "in range" if not outside else "mixed" if inside.any() else "out of range"
-    return Report(
-        kind="estimate",
-        verdict=verdict(columns, by, remarks),
+    """The report of estimates with their columns (n,), a row of the table or a group each."""
+    answered, inside = found.answered, found.answered & found.estimate.in_range
+    labels = np.asarray(found.names if found.by else np.arange(1, len(inside) + 1)).astype(np.str_)
+    outside = bool((answered & ~inside).any())
+    return replace(
+        found.estimate.at(answered).report(labels[answered].tolist()),
+        verdict=verdict(columns, found.by, remarks),
+        figures=None,
         tables=[ReportTable.of("Estimates", columns)],
-        pictures=[drawn.picture()],
         remarks=[remark for remark in remarks if remark.code != NEXT_ROW],
         next_steps=[remark.text for remark in remarks if remark.code == NEXT_ROW],
-        status=status,
+        status="in range" if not outside else "mixed" if inside.any() else "out of range",
         tone="warn" if outside else "good",
         title=title,
-        basis=f"{int(inside.sum())} of {len(labels)} estimates, one for each {group}, are in the "
-        "range of the training",
+        basis=f"{int(inside.sum())} of {len(inside)} estimates, one for each {found.by or 'row'}, "
+        "are in the range of the training",
         notation=[
             ("+-", "one standard deviation of the error that is expected."),
             ("90 %", "interval that covers the value with that probability, by model and noise."),

@@ -1,9 +1,11 @@
-"""Estimates of the rows and runs of a table: readings by name, blocks of rows, remarks."""
+"""Estimates of the rows and runs of a table, by one file or several."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
@@ -15,16 +17,13 @@ from soilml.io.read_table import Rows, as_table
 from soilml.io.table import ALL, Table
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import ROWS_PER_CALL, Estimator
+from soilml.onboard.multi_sensor import fuse_estimates
 from soilml.onboard.set_contract import (
-    INFERRED,
-    MODEL_ERROR_INPUT,
     OPERATING_NOISE,
     OPERATING_STD_INPUTS,
     OPTIONAL_READINGS,
 )
-from soilml.onboard.set_posterior import SetPosterior
 from soilml.quantities import CHANNELS, column
-from soilml.remarks import Remark
 from soilml.results import is_frame
 
 
@@ -70,18 +69,116 @@ def _fill_blank_std(spread: Any, estimator: Estimator, name: str, reading: Any) 
     return np.where(np.isfinite(spread) & (spread > 0.0), spread, own)
 
 
-def estimates_of_rows(
+#: Opens a progress display of a text and a number of steps, which gives the function to report by.
+Progress = Callable[[str, int], AbstractContextManager[Callable[[int], None]]]
+
+
+@contextmanager
+def unseen(text: str, total: int) -> Iterator[Callable[[int], None]]:
+    """A progress display that shows nothing."""
+    yield lambda done: None
+
+
+@dataclass(frozen=True)
+class TableEstimates:
+    """Estimates of the n rows of a table, or of n groups of its rows, which have one soil each.
+
+    estimator: The first file.
+    table, by: The table, and the column of its groups; None where each row is by itself.
+    names: Names of the groups.
+    estimate: (n,).
+    answered: Whether each had a row with all readings, (n,).
+    rows: Rows with all readings of each group, (n,).
+    readings: Inputs of the file by group, of those answered; of all rows where there are no groups.
+    files: Files that took part in each estimate, (n,), and the rule by which they were fused.
+    """
+
+    estimator: Estimator
+    table: Table
+    by: str | None
+    names: list[Any]
+    estimate: Estimate
+    answered: NDArray[np.bool_]
+    rows: NDArray[np.int64]
+    readings: list[dict[str, Any]]
+    box: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # narrower prior
+    files: NDArray[np.int64] | None = None
+    rule: str | None = None
+
+    def columns(self, inputs: Sequence[str]) -> dict[str, Any]:
+        """Columns (n,) of a table, with the readings of these names where each row is by itself."""
+        if self.by is None:
+            heads = ("run", *(column(name) for name in inputs))
+            found: dict[str, Any] = {key: self.table[key] for key in heads}
+        else:
+            inside = self.rows - self.estimate.rows_set_aside
+            found = {self.by: np.asarray(self.names), "rows": self.rows}
+            found["rows_in_range"] = np.where(self.answered, inside, 0)
+        found |= {
+            key: np.where(self.answered, values, np.nan)
+            for key, values in self.estimate.reading_columns().items()
+        }
+        found["in_range"] = self.answered & self.estimate.in_range
+        if self.by is not None and self.estimator.sets is not None:
+            found["disagrees"] = self.answered & self.estimate.disagrees.astype(bool)
+        return found if self.files is None else found | {"files": self.files}
+
+
+def estimates_of_table(
+    estimators: Sequence[Estimator],
+    table: Table,
+    by: str | None = None,
+    *,
+    adjusted: Callable[[Estimator, dict[str, Any]], dict[str, Any]] = lambda _, readings: readings,
+    box: Mapping[str, tuple[float, float]] | None = None,
+    progress: Progress = unseen,
+) -> TableEstimates:
+    """Estimates of all rows by themselves, fused where there are several files, or of groups.
+
+    by: Column of whose groups each has one soil, or `all`; only the first file is then used.
+    adjusted: Inputs of a file, changed for errors of its model.
+    box: Narrower prior of the estimates of groups.
+
+    Raises `TableError` where no row has all readings of a file.
+    """
+    usable = [complete_rows(estimator, table) & table.answered for estimator in estimators]
+    first = estimators[0]
+    if not np.any(usable):
+        wanted = ", ".join(column(name) for name in first.inputs)
+        raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
+    if by is None:
+        found, given = [], []
+        for estimator, rows in zip(estimators, usable, strict=True):
+            alone = estimator.sets is not None and estimator.sets.sets_only
+            own = joint_readings if alone else row_readings
+            given.append(adjusted(estimator, own(estimator, table.rows(rows))))
+            with progress(f"estimating {int(rows.sum())} rows", int(rows.sum())) as done:
+                found.append(_estimates_of_rows(estimator, given[-1], rows, done))
+        answered = np.any(usable, axis=0)
+        one = TableEstimates(first, table, None, [], found[0], answered, answered * 1, given[:1])
+        if len(found) == 1:
+            return one
+        fused = fuse_estimates(found)
+        return replace(one, estimate=fused.estimate, files=fused.used.sum(axis=0), rule=fused.rule)
+    groups = dict(table.rows(usable[0]).groups(by))
+    readings = [adjusted(first, joint_readings(first, rows)) for rows in groups.values()]
+    with progress(f"estimating by {by}", len(groups)) as done:
+        estimate = _estimates_of_runs(first, readings, box or {}, done)
+    names = [name for name, _ in table.groups(by)]
+    place = {name: i for i, name in enumerate(groups)}
+    answered = np.asarray([name in place for name in names])
+    counts = np.asarray([len(groups[name]) if name in groups else 0 for name in names])
+    estimate = estimate.at(np.asarray([place.get(name, 0) for name in names]))
+    return TableEstimates(first, table, by, names, estimate, answered, counts, readings, box or {})
+
+
+def _estimates_of_rows(
     estimator: Estimator,
     readings: Mapping[str, Any],
     usable: NDArray[np.bool_],
     done: Callable[[int], None],
 ) -> Estimate:
-    """An estimate for every row of a table; one that is not usable counts as out of range.
-
-    readings: Inputs (usable rows,) by name.
-    usable: Rows (rows,) that have all readings.
-    done: Is given the number of rows that are estimated, after each block.
-    """
+    """An estimate for every row of a table; one that is not usable (rows,) is out of range."""
     result, index = estimator.prior_estimate(len(usable)), np.flatnonzero(usable)
     for first in range(0, index.size, ROWS_PER_CALL):
         block = slice(first, first + ROWS_PER_CALL)
@@ -92,15 +189,21 @@ def estimates_of_rows(
     return result
 
 
-def estimates_of_runs(
+def _estimates_of_runs(
     estimator: Estimator,
     readings: Sequence[Mapping[str, Any]],
     box: Mapping[str, tuple[float, float]],
+    done: Callable[[int], None],
 ) -> Estimate:
     """Estimates (runs,) from the readings of each run, within a narrower prior if there is one."""
-    found = (estimator.run(**one) for one in readings)
-    shape = (len(readings),)
-    return Estimate.stack((one.within(**box) if box else one for one in found), shape)
+
+    def one_by_one() -> Iterator[Estimate]:
+        for number, one in enumerate(readings, 1):
+            found = estimator.run(**one)
+            yield found.within(**box) if box else found
+            done(number)
+
+    return Estimate.stack(one_by_one(), (len(readings),))
 
 
 def estimate(rows: Rows, model: Estimator | str | os.PathLike[str], by: str | None = None) -> Any:
@@ -128,24 +231,15 @@ def estimate(rows: Rows, model: Estimator | str | os.PathLike[str], by: str | No
     InputError, TableError, ModelFileError
         As `read_table`, `Estimator.load` and `Estimator.run`; also where no row is complete.
     """
-    table = as_table(rows)
     estimator = model if isinstance(model, Estimator) else Estimator.load(model)
-    usable = complete_rows(estimator, table) & table.answered
-    if not usable.any():
-        wanted = ", ".join(column(name) for name in estimator.inputs)
-        raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
+    found = estimates_of_table([estimator], as_table(rows), by)
     if by is None:
-        alone = estimator.sets is not None and estimator.sets.sets_only
-        own = joint_readings if alone else row_readings
-        given = own(estimator, table.rows(usable))
-        found = estimates_of_rows(estimator, given, usable, lambda _: None)
-        return found.to_frame().set_axis(rows.index) if is_frame(rows) else found  # type: ignore[union-attr]
-    groups = list(table.rows(usable).groups(by))
-    readings = [joint_readings(estimator, own) for _, own in groups]
-    found = estimates_of_runs(estimator, readings, {})
+        return found.estimate.to_frame().set_axis(rows.index) if is_frame(rows) else found.estimate  # type: ignore[union-attr]
+    of_groups = found.estimate.at(found.answered)
     if is_frame(rows):
-        return found.to_frame().set_axis([name for name, _ in groups]).rename_axis(by)
-    return found.at(0) if by == ALL else found
+        names = [name for name, known in zip(found.names, found.answered, strict=True) if known]
+        return of_groups.to_frame().set_axis(names).rename_axis(by)
+    return of_groups.at(0) if by == ALL else of_groups
 
 
 def check_independent(estimators: Sequence[Estimator]) -> None:
@@ -158,57 +252,6 @@ def check_independent(estimators: Sequence[Estimator]) -> None:
                 f"{first.path} and {second.path} both read {names}: their errors are not "
                 "independent; use one of them"
             )
-
-
-def excluded_rows(table: Table, rows: NDArray[np.bool_], code: str, why: str) -> list[Remark]:
-    """A remark on rows that get no estimate: how many, the reason, and the first three."""
-    if not rows.any():
-        return []
-    some = ", ".join(str(table.place(int(i))) for i in np.flatnonzero(rows)[:3])
-    more = ", ..." if rows.sum() > 3 else ""
-    return [Remark(code, f"{int(rows.sum())} rows {why} and get no estimate: {some}{more}")]
-
-
-def unused_std_remarks(estimator: Estimator, table: Table) -> list[Remark]:
-    """A note on columns of standard deviations that estimates of single rows do not use."""
-    if estimator.sets is not None and estimator.sets.sets_only:
-        return []
-    spreads = [f"{column(name)}_std" for name in (*CHANNELS, *OPERATING_NOISE)]
-    given = tuple(key for key in spreads if key in table)
-    if not given:
-        return []
-    hint = "give --by" if estimator.sets is not None else "train a file with [set_posterior]"
-    text = f"estimates of single rows do not use {', '.join(given)}; {hint} to have them used"
-    return [Remark("unused-std", text, given, "note")]
-
-
-def channel_remarks(estimator: Estimator, readings: dict[str, Any]) -> list[Remark]:
-    """A note on the channels used, for a file that can use more than it requires."""
-    if estimator.sets is None:
-        return []
-    rows = {name: int(np.isfinite(readings[name]).sum()) for name in CHANNELS if name in readings}
-    used = {name: count for name, count in rows.items() if count}
-    said = ", ".join(f"{name.replace('_', ' ')} ({count} rows)" for name, count in used.items())
-    first = Remark("channels-used", f"uses slip, load and {said}", tuple(used), "note")
-    remarks = [first, *_common_error_remarks(estimator.sets)]
-    size = estimator.sets.common_errors.get(MODEL_ERROR_INPUT, 0.0)
-    if size == INFERRED:
-        text = "errors of the model are included, of a size that follows from the residuals"
-    elif size:
-        text = f"errors of the model are included, {size:g} times the usual ones"
-    else:
-        text = "a perfect model is assumed, or one with the errors that the case states"
-    return [*remarks, Remark("model-errors", text, severity="note")]
-
-
-def _common_error_remarks(sets: SetPosterior) -> list[Remark]:
-    """A note on the errors that all rows are assumed to share."""
-    stds = {n: std for n, std in sets.common_errors.items() if std > 0.0 and n in ERRORS_SHOWN}
-    if not stds:
-        return []
-    said = sensor_errors_shown(stds)
-    text = f"assumes that all rows share errors with standard deviations of {said}"
-    return [Remark("shared-errors", text, tuple(stds), "note")]
 
 
 #: Errors of sensors that all rows share: factor from the SI unit, and text; gains in %.

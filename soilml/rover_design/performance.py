@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats, Real
-from soilml.parameters import mapped
+from soilml.arrays import Floats
 from soilml.physics.contact import Force
 from soilml.physics.effects.grousers import Grousers
-from soilml.physics.equilibrium import without_unsolved
-from soilml.physics.forces import apply_input_effects
 from soilml.physics.gears import Wheel
-from soilml.physics.load_case import LoadCase
-from soilml.physics.model import Model, in_chunks
+from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
-from soilml.physics.sinkage_estimate import coarse_estimate
-from soilml.physics.sinkage_search import equilibrium_near
-from soilml.physics.soils import Soil
 from soilml.processes import process_map, usable_cores
 from soilml.rover_design.study import DesignStudy
 from soilml.rover_design.worlds import DrawnWorlds
+from soilml.traction.rover_performance import NeededSlip
 
 #: Slips of a sweep and of a reported design, as shares of the slip limit.
 SWEPT = np.asarray([0.12, 0.3, 0.55, 0.8, 1.0])
@@ -66,7 +59,6 @@ def evaluate(
     worlds: DrawnWorlds,
     *,
     shares: Floats = REPORTED,
-    quick: bool = False,
 ) -> Outcomes:
     r"""Outcomes of designs in worlds.
 
@@ -79,7 +71,6 @@ def evaluate(
 
     designs: Values (k,) by dimension of the study.
     shares: Slips, as shares of the slip limit.
-    quick: Take the equilibrium next to an estimate, without looking for an earlier one.
 
     Raises `InputError` where a wheel leaves the ground on the slope.
 
@@ -91,7 +82,7 @@ def evaluate(
     for wheels in np.unique(designs["wheels"]):
         own = np.flatnonzero(designs["wheels"] == wheels)
         values = {name: column[own] for name, column in designs.items()}
-        parts.append((own, _of_equal_wheels(study, int(wheels), values, worlds, shares, quick)))
+        parts.append((own, _of_equal_wheels(study, int(wheels), values, worlds, shares)))
     joined = {}
     for field in fields(Outcomes):
         one = getattr(parts[0][1], field.name)
@@ -108,7 +99,7 @@ def in_blocks(
     keep: Callable[[NDArray[np.int64], Outcomes], None],
     progress: Callable[[int], None] | None = None,
 ) -> None:
-    """Evaluate designs quickly, on the slips of a sweep, in blocks and by several processes.
+    """Evaluate designs on the slips of a sweep, in blocks and by several processes.
 
     keep: Given the numbers of some designs (b,) and their outcomes, which are not held.
     progress: Given the number of designs done.
@@ -130,8 +121,8 @@ def in_blocks(
 
 
 def _swept(study: DesignStudy, worlds: DrawnWorlds, designs: Mapping[str, Floats]) -> Outcomes:
-    """Quick outcomes of designs (k,) on the slips of a sweep."""
-    return evaluate(study, designs, worlds, shares=SWEPT, quick=True)
+    """Outcomes of designs (k,) on the slips of a sweep."""
+    return evaluate(study, designs, worlds, shares=SWEPT)
 
 
 def _of_equal_wheels(
@@ -140,7 +131,6 @@ def _of_equal_wheels(
     designs: Mapping[str, Floats],
     worlds: DrawnWorlds,
     shares: Floats,
-    quick: bool,
 ) -> Outcomes:
     """The outcomes of designs that have the same number of wheels."""
     goal, count = study.goal, len(designs["radius"])
@@ -148,8 +138,8 @@ def _of_equal_wheels(
     load = designs["mass"][:, None] * study.axle_loads(wheels, goal.slope)  # (k, axles)
     shape = (count, worlds.count, load.shape[1], len(slip))
     pull, torque, sinkage = (np.empty(shape) for _ in range(3))
-    for name, draw in worlds.groups():
-        force = _forces(designs, load, worlds, name, draw, slip, quick)
+    for draw in worlds.groups():
+        force = _forces(designs, load, worlds, draw, slip)
         pull[:, draw] = force.drawbar_pull
         torque[:, draw] = force.torque
         sinkage[:, draw] = force.sinkage
@@ -160,7 +150,7 @@ def _of_equal_wheels(
     best = np.argmax(known, axis=-1)[..., None]
     margin = np.take_along_axis(known, best, axis=-1)[..., 0] - needed
     error = 2.0 * np.take_along_axis(pull_error.sum(axis=2), best, axis=-1)[..., 0]
-    at = _Needed.of(total, needed)
+    at = NeededSlip.of(total, needed)
     radius = designs["radius"][:, None, None]
     work = 2.0 * torque.sum(axis=2) / (radius * (1.0 - slip))
     found_slip = at.of_curve(np.broadcast_to(slip, total.shape))
@@ -179,16 +169,14 @@ def _forces(
     designs: Mapping[str, Floats],
     load: Floats,
     worlds: DrawnWorlds,
-    effect: str,
     draw: NDArray[np.int64],
     slip: Floats,
-    quick: bool,
 ) -> Force:
     """Forces (k, g, axles, m) of k designs in the g worlds of one group."""
     shape = (len(load), len(draw), load.shape[1], len(slip))
     design, world, axle, column = (grid.ravel() for grid in np.indices(shape))
     world = draw[world]
-    effects = worlds.effects(effect, world, load.mean(axis=1)[design])
+    effects = worlds.effects(world, load.mean(axis=1)[design])
     if np.any(designs["lug_height"] > 0.0):
         lugs = Grousers(
             height=designs["lug_height"][design],
@@ -200,37 +188,8 @@ def _forces(
     at = Operating(
         slip=slip[column], load=load[design, axle], pass_number=axle + 1.0, slip_angle=0.0
     )
-    model, soil = Model(gear, tuple(effects)), worlds.of_soil(world)
-    force = _nearest(model, soil, at) if quick else model(soil, at)
+    force = Model(gear, tuple(effects))(worlds.of_soil(world), at)
     return Force(**{f.name: np.reshape(getattr(force, f.name), shape) for f in fields(Force)})
-
-
-def _nearest(model: Model, soil: Soil, at: Operating) -> Force:
-    """Forces at the equilibrium next to a coarse estimate; rows without it by the full search."""
-    load_case, _ = model.load_case(soil, at)
-
-    def solve(part: LoadCase) -> Force:
-        part = apply_input_effects(part)
-        found = equilibrium_near(part, replace(coarse_estimate(part), nearest=True, rough=True))
-        return without_unsolved(found)
-
-    with np.errstate(all="ignore"):
-        force = in_chunks(load_case, solve)
-        failed = np.flatnonzero(force.status != 0)
-        if failed.size:
-            again = _rows(model, soil, at, failed)
-            for field in fields(Force):
-                getattr(force, field.name)[failed] = getattr(again, field.name)
-    return force
-
-
-def _rows(model: Model, soil: Soil, at: Operating, index: NDArray[np.int64]) -> Force:
-    """Forces of some rows by the full search."""
-
-    def some(value: Any) -> Real:
-        return np.asarray(value)[index] if np.ndim(value) else value
-
-    return mapped(model, some)(mapped(soil, some), mapped(at, some))
 
 
 def _with_errors(
@@ -259,32 +218,6 @@ def _range_with_zero(values: Floats) -> Floats:
     known = np.nan_to_num(values)
     high, low = known.max(axis=-1, keepdims=True), known.min(axis=-1, keepdims=True)
     return np.asarray(np.maximum(high, 0.0) - np.minimum(low, 0.0))
-
-
-@dataclass(frozen=True)
-class _Needed:
-    """Where curves over the slips reach what is needed: index before, share of the way, whether."""
-
-    before: NDArray[np.int64]
-    index: NDArray[np.int64]
-    share: Floats
-    reached: NDArray[np.bool_]
-
-    @staticmethod
-    def of(total: Floats, needed: Floats) -> _Needed:
-        """For totals (k, n, m) and what is needed (k, 1)."""
-        enough = np.nan_to_num(total, nan=-np.inf) >= needed[..., None]
-        index = np.argmax(enough, axis=-1)[..., None]
-        before = np.maximum(index - 1, 0)
-        low, high = (np.take_along_axis(total, i, axis=-1) for i in (before, index))
-        rise = np.where(high > low, high - low, 1.0)
-        share = np.where(index > 0, (needed[..., None] - low) / rise, 1.0)
-        return _Needed(before, index, share, np.asarray(enough.any(axis=-1)))
-
-    def of_curve(self, values: Floats) -> Floats:
-        """Values (k, n, m) interpolated there, (k, n); NaN where it is not reached."""
-        low, high = (np.take_along_axis(values, i, axis=-1) for i in (self.before, self.index))
-        return np.where(self.reached, (low + self.share * (high - low))[..., 0], np.nan)
 
 
 def lugs_needed(radius: Floats, height: Floats, sinkage: Floats, slip: Floats) -> Floats:

@@ -287,7 +287,7 @@ def _remarks(
         )
         yield Remark("other-gravity", text)
     if study.soil.rows is not None:
-        text = "errors of the model are as before the rows, which may know them better"
+        text = "smooth errors are as before the rows, whose posterior gives soil and effects"
         yield Remark("errors-before-rows", text, severity="note")
     error = 100.0 * math.sqrt(max(results["probability"] * (1.0 - results["probability"]), 1e-4))
     text = (

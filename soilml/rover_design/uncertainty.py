@@ -156,13 +156,9 @@ def _inputs(worlds: DrawnWorlds, outcome: Outcomes) -> dict[str, Floats]:
         size = float(np.abs(worlds.soil.get(name, values)).max())
         if name in WORDS and np.ptp(values) > 1e-9 * size:
             inputs[name] = ((values - values.mean()) / values.std())[:, None]
-    names = [name for name in np.unique(worlds.effect) if name]
-    if names:
-        sizes = []
-        for name in names:
-            own = np.where(worlds.effect == name, worlds.size, 0.0)
-            sizes.append(own / max(float(np.abs(own).max()), 1e-300))
-        inputs["effect"] = np.stack(sizes, axis=1)
+    if worlds.lacking:
+        sizes = np.stack([getattr(e, e.about.size) for e in worlds.lacking], axis=1) * worlds.acts
+        inputs["effect"] = sizes / np.maximum(np.abs(sizes).max(axis=0), 1e-300)
     return inputs
 
 

@@ -18,7 +18,7 @@ from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, ModelledErrors, wit
 from soilml.io.read_table import RUNS, read_table
 from soilml.numerics.prior import Prior
 from soilml.numerics.smooth_process import SmoothFunctions, process_columns, slip_load_points
-from soilml.parameters import declared
+from soilml.parameters import declared, mapped
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.physics.effects.grousers import Grousers
 from soilml.physics.gears import Wheel
@@ -64,10 +64,10 @@ class DrawnWorlds:
         Errors (n,) by the names of `USUAL_MODEL_ERRORS`.
     scale
         Size (n,) of all errors over the typical ones.
-    effect
-        Name (n,) of the effect that the model lacks; "" for none.
-    size
-        Its size (n,), in its unit.
+    lacking
+        Effects that the plain model lacks, with parameters (n,).
+    acts
+        Which of them act in each draw, (n, effects).
     lug_shearing
         Lambda of `grousers`, (n,).
     smooth
@@ -83,8 +83,8 @@ class DrawnWorlds:
     kinds: tuple[str, ...]
     errors: Mapping[str, Floats]
     scale: Floats
-    effect: NDArray[np.str_]
-    size: Floats
+    lacking: tuple[Effect, ...]
+    acts: NDArray[np.bool_]
     lug_shearing: Floats
     smooth: SmoothFunctions
     weights: Floats
@@ -95,22 +95,23 @@ class DrawnWorlds:
         """Number of draws, n."""
         return len(self.scale)
 
-    def groups(self) -> list[tuple[str, NDArray[np.int64]]]:
-        """Draws (g,) that share one form of the model, by the name of its effect."""
-        return [(str(e), np.flatnonzero(self.effect == e)) for e in np.unique(self.effect)]
+    def groups(self) -> list[NDArray[np.int64]]:
+        """Draws (g,) that share one form of the model, by the effects that act."""
+        _, which = np.unique(self.acts, axis=0, return_inverse=True)
+        return [np.flatnonzero(np.ravel(which) == i) for i in range(int(which.max()) + 1)]
 
-    def effects(self, name: str, draw: NDArray[np.int64], mean_load: Floats) -> list[Effect]:
+    def effects(self, draw: NDArray[np.int64], mean_load: Floats) -> list[Effect]:
         """The effects (k,) by which these draws (k,), of one group, differ from the plain model.
 
         mean_load: Mean load of the wheels of each, N (k,).
         """
         solved = [n for n in declared(ModelledErrors) if n in self.errors]
         values = {n: self.errors[n][draw] for n in solved}
-        found: list[Effect] = [ModelledErrors(**values, typical_load=mean_load)]
-        if name:
-            own = EFFECTS[name]
-            found.append(own(**{own.about.size: self.size[draw]}))
-        return found
+        own = [e for e, acts in zip(self.lacking, self.acts[draw[0]], strict=True) if acts]
+        return [
+            ModelledErrors(**values, typical_load=mean_load),
+            *(mapped(e, lambda v: v[draw] if np.ndim(v) else v) for e in own),
+        ]
 
     def of_soil(self, draw: NDArray[np.int64]) -> Soil:
         """The soils (k,) of these draws (k,)."""
@@ -122,7 +123,7 @@ def draw_worlds(
     count: int,
     slip_limit: float,
     seed: int = 0,
-    rows: RowsSoil | None = None,
+    rows: MeasuredSoil | None = None,
 ) -> DrawnWorlds:
     r"""Draws of the soil and of the model's errors, before any test of the design.
 
@@ -137,9 +138,14 @@ def draw_worlds(
     rows: What `soil_of_rows` gives for the question.
     """
     rng = np.random.default_rng(seed)
-    soil, kind, kinds, free, remarks = _soils(question, count, rng, rows)
+    if rows is None:
+        soil, kind, kinds, free, remarks = _soils(question, count, rng)
+        scale, lacking, acts = _hypotheses(count, rng)
+    else:
+        kind, kinds = np.zeros(count, np.int64), (question.files[-1],)
+        soil, free, lacking, acts = _of_rows(rows, count, rng)
+        scale, remarks = _hypotheses(count, rng, effects=False)[0], list(rows.warnings)
     names = [n for n in USUAL_MODEL_ERRORS if n not in without_errors(free, (), [_WHEEL])]
-    scale, effect, size = _hypotheses(count, rng)
     normal = _stratified_normal(count, len(names), rng)
     errors = {n: USUAL_MODEL_ERRORS[n] * scale * normal[:, i] for i, n in enumerate(names)}
     lengths = Discrepancy().slip_length, Discrepancy().log_load_length
@@ -147,7 +153,7 @@ def draw_worlds(
     weights = SMOOTH * scale[:, None, None] * rng.standard_normal((count, 2, smooth.count))
     lug = LUG_SHEARING[0] + (LUG_SHEARING[1] - LUG_SHEARING[0]) * _stratified(count, rng)
     return DrawnWorlds(
-        soil, kind, kinds, errors, scale, effect, size, lug, smooth, weights, tuple(remarks)
+        soil, kind, kinds, errors, scale, lacking, acts, lug, smooth, weights, tuple(remarks)
     )
 
 
@@ -159,11 +165,9 @@ def _unit_columns(lengths: tuple[float, float], slip: Floats, load: Floats) -> F
 
 
 def _soils(
-    question: SoilQuestion, count: int, rng: np.random.Generator, rows: RowsSoil | None
+    question: SoilQuestion, count: int, rng: np.random.Generator
 ) -> tuple[dict[str, Floats], NDArray[np.int64], tuple[str, ...], list[str], list[Remark]]:
     """Parameters (n,), kinds (n,) and their names, parameters that vary, remarks."""
-    if rows is not None:
-        return _posterior(rows, question.files[-1], count, rng)
     own = {name: entry.soil for name, entry in question.entries.items()}
     if question.soil is not None:
         own = {"the soil of the file": question.soil}
@@ -195,15 +199,7 @@ def _soils(
     return values, kind, tuple(own), common, remarks
 
 
-@dataclass(frozen=True)
-class RowsSoil:
-    """The posterior of measured rows, averaged over explanations of them, and its model file."""
-
-    case: Case
-    found: MeasuredSoil
-
-
-def soil_of_rows(question: SoilQuestion) -> RowsSoil | None:
+def soil_of_rows(question: SoilQuestion) -> MeasuredSoil | None:
     """The posterior of the rows that a question names; None for one without rows.
 
     Raises `InputError` for a model file of several gears, and as `identify`.
@@ -214,35 +210,52 @@ def soil_of_rows(question: SoilQuestion) -> RowsSoil | None:
     case = read_case(model, with_bias=True, files=question.named, with_explanations=True)
     if case.gears:
         raise InputError(f"{model} has several gears; needed is one with [gear]")
-    return RowsSoil(case, measured_soil(replace(case, rover=None), read_table(runs, RUNS)))
+    return measured_soil(replace(case, rover=None), read_table(runs, RUNS))
 
 
-def _posterior(
-    rows: RowsSoil, name: str, count: int, rng: np.random.Generator
-) -> tuple[dict[str, Floats], NDArray[np.int64], tuple[str, ...], list[str], list[Remark]]:
-    """Draws of a posterior: what `_soils` gives."""
-    draws, soil = rows.found.draws, rows.case.soil
-    index = rng.permutation(np.arange(count) % len(draws.values))
-    values = {key: np.full(count, float(getattr(soil, key))) for key in declared(Soil)}
-    varied = [key for key in draws.names if key in values]
-    for key in varied:
-        values[key] = draws.values[index, draws.names.index(key)]
-    return values, np.zeros(count, np.int64), (name,), varied, list(rows.found.warnings)
+def _of_rows(
+    rows: MeasuredSoil, count: int, rng: np.random.Generator
+) -> tuple[dict[str, Floats], list[str], tuple[Effect, ...], NDArray[np.bool_]]:
+    """Soil, parameters of it that vary, and effects with the draws in which they act.
+
+    Effects of rig and sensors, and those that need what is not known of a rover, are left out.
+    """
+    index = rng.permutation(np.arange(count) % len(rows.draws.values))
+    drawn = dict(zip(rows.draws.names, rows.draws.values[index].T, strict=True))
+    soil = {
+        key: drawn.get(key, np.full(count, float(getattr(rows.case.soil, key))))
+        for key in declared(Soil)
+    }
+    effects, acts = [], []
+    for effect in rows.case.model.effects:
+        if not _acts_on_a_rover(type(effect)):
+            continue
+        fixed = {key: float(getattr(effect, key)) for key in declared(type(effect))}
+        own = {
+            key: drawn.get(f"{effect.name}.{key}", np.full(count, value))
+            for key, value in fixed.items()
+        }
+        effects.append(replace(effect, **own))
+        acts.append(own[effect.about.size] != getattr(type(effect)(), effect.about.size))
+    varied = [key for key in drawn if key in soil]
+    return soil, varied, tuple(effects), np.reshape(acts, (len(effects), count)).T
 
 
-def _hypotheses(count: int, rng: np.random.Generator) -> tuple[Floats, NDArray[np.str_], Floats]:
-    """Scale of the errors, name of the missing effect and its size, each (n,)."""
+def _hypotheses(
+    count: int, rng: np.random.Generator, *, effects: bool = True
+) -> tuple[Floats, tuple[Effect, ...], NDArray[np.bool_]]:
+    """Scale (n,) of the errors, and missing effects with the draws in which they act."""
     candidates = [n for n, e in EFFECTS.items() if e.applies_to(_WHEEL) and e is not Grousers]
     options = [(EXACT, 0.0, "", 0.0), *((p, s, "", 0.0) for s, p in ERRORS.items())]
-    options += [(LAW / len(LAWS), 0.0, name, LAW_SIZE) for name in LAWS]
-    for scale, prior in EFFECT.items():
-        share = prior / (len(candidates) * len(SIZES))
-        options += [(share, scale, name, std) for name in candidates for std in SIZES]
+    if effects:
+        options += [(LAW / len(LAWS), 0.0, name, LAW_SIZE) for name in LAWS]
+        for scale, prior in EFFECT.items():
+            share = prior / (len(candidates) * len(SIZES))
+            options += [(share, scale, name, std) for name in candidates for std in SIZES]
     ends = np.cumsum([o[0] for o in options])
     chosen = np.searchsorted(ends / ends[-1], _stratified(count, rng), side="right")
     fraction = rng.random(count)
-    size = np.zeros(count)
-    effect = np.full(count, "", dtype=f"<U{max(map(len, EFFECTS))}")
+    sizes: dict[str, Floats] = {}
     for number in np.unique(chosen):
         _, _, name, std = options[number]
         if not name or not _acts_on_a_rover(EFFECTS[name]):
@@ -251,9 +264,15 @@ def _hypotheses(count: int, rng: np.random.Generator) -> tuple[Floats, NDArray[n
         bounds, std = declared(EFFECTS[name])[about.size], std * abs(about.reference[about.size])
         ends_of_size = max(bounds.lower, -REACH * std), min(bounds.upper, REACH * std)
         rows = np.flatnonzero(chosen == number)
-        effect[rows] = name
-        size[rows] = Prior(*ends_of_size, normal_std=std).at(fraction[rows])
-    return np.asarray([o[1] for o in options])[chosen], effect, size
+        sizes.setdefault(name, np.full(count, np.nan))[rows] = Prior(
+            *ends_of_size, normal_std=std
+        ).at(fraction[rows])
+    acts = np.isfinite(np.reshape(list(sizes.values()), (len(sizes), count))).T
+    lacking = (
+        EFFECTS[name](**{EFFECTS[name].about.size: np.nan_to_num(own)})
+        for name, own in sizes.items()
+    )
+    return np.asarray([o[1] for o in options])[chosen], tuple(lacking), acts
 
 
 def _acts_on_a_rover(effect: type[Effect]) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError, TableError
-from soilml.io.read_table import Rows, as_table
+from soilml.fitting.operating_points import with_rover_columns
+from soilml.io.read_table import Rows, as_table, check_table
 from soilml.io.table import Table
 from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.quantities import QUANTITIES
@@ -107,8 +109,8 @@ def read_drive(table: Rows, case: Case) -> DriveRows:
         raise InputError("the model file has no [rover]; soilml drive slip needs mass and wheels")
     speed = _one_of(table, "rim_speed_m_s", "wheel_speed_rad_s")
     reading = _one_of(table, "torque_Nm", "current_A")
-    for name in ("time_s", "wheel", speed, "slope_rad"):
-        _filled(table, name)
+    need = ("time_s", "wheel", speed, "slope_rad", *(["load_N"] if "load_N" in table else []))
+    table = with_rover_columns(case, check_table(table, Path(table.source), need, need, None))
     wheels = tuple(rover.wheels)
     order = _by_wheel(table, wheels)
 
@@ -134,7 +136,6 @@ def read_drive(table: Rows, case: Case) -> DriveRows:
         torque = torque * constant
     slope = each("slope_rad")[:, 0]
     if "load_N" in table:
-        _filled(table, "load_N")
         load = each("load_N")
     else:
         roll = each("roll_rad")[:, 0] if "roll_rad" in table else np.zeros(len(slope))
@@ -152,26 +153,8 @@ def _one_of(table: Table, name: str, other: str) -> str:
     raise TableError(f"{table.source}: column {name} is missing; needed is {name} or {other}")
 
 
-def _filled(table: Table, name: str) -> None:
-    if name not in table:
-        raise TableError(f"{table.source}: column {name} is missing; soilml drive slip needs it")
-    blank = table[name] == "" if name == "wheel" else ~np.isfinite(table[name])
-    if blank.any():
-        place = table.place(int(np.argmax(blank)))
-        raise TableError(
-            f"{place}, column {name}: the cell is blank; soilml drive slip needs a value"
-        )
-
-
 def _by_wheel(table: Table, wheels: Sequence[str]) -> NDArray[np.int64]:
     """Positions (n, k) of the rows of each time and wheel."""
-    known = np.isin(table["wheel"], wheels)
-    if not known.all():
-        row = int(np.argmin(known))
-        raise TableError(
-            f"{table.place(row)}, column wheel: {str(table['wheel'][row])!r}; wheels of [rover] "
-            f"are: {', '.join(wheels)}"
-        )
     times = np.unique(table["time_s"])
     order = np.full((len(times), len(wheels)), -1)
     at = np.searchsorted(times, table["time_s"])

@@ -13,7 +13,6 @@ from soilml.errors import InputError
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.mixtures import without_faults
 from soilml.fitting.operating_points import wheel_gears, wheel_passes
-from soilml.physics.operating_point import Operating
 from soilml.traction.draws import SoilDraws
 from soilml.traction.soil_draws import mixed_prior_draws, prior_draws
 
@@ -82,8 +81,10 @@ def force_table(
     for gear, number in kinds:
         own = without_faults(case.of_gear(gear) if gear else case)
         radius[gear] = float(own.model.gear.radius)
-        found.append(_forces(own, draws, load, number, gear, radius[gear]))
-    pull, torque = (np.stack(each) for each in zip(*found, strict=True))
+        wide = np.broadcast_to(load[:, None], (len(load), len(draws.values)))
+        force = draws.on_grid(own, wide, SLIP, gear, pass_number=float(number), slip_angle=0.0)
+        found.append((force.drawbar_pull, force.torque / radius[gear]))
+    pull, torque = (np.stack(each) / load[:, None, None] for each in zip(*found, strict=True))
     carried = np.isfinite(pull).all(axis=(0, 1, 3)) & np.isfinite(torque).all(axis=(0, 1, 3))
     if carried.mean() < LEAST_CARRIED:
         raise InputError(
@@ -107,21 +108,6 @@ def force_table(
 def _effects(case: Case) -> set[str]:
     models = (case.model, *case.gears.values())
     return {effect.name for model in models for effect in model.effects}
-
-
-def _forces(
-    case: Case, draws: SoilDraws, load: Floats, number: int, gear: str, radius: float
-) -> tuple[Floats, Floats]:
-    """Pull over load, and torque over load and radius, (l, n, m); NaN where not carried."""
-    shape = len(load), len(draws.values), len(SLIP)
-    at_load, draw, at_slip = (grid.ravel() for grid in np.indices(shape))
-    at = Operating(
-        slip=SLIP[at_slip], load=load[at_load], pass_number=float(number), slip_angle=0.0
-    )
-    force = draws.forces(case, draw, at, gear)
-    scale = load[:, None, None]
-    pull, torque = np.asarray(force.drawbar_pull), np.asarray(force.torque)
-    return pull.reshape(shape) / scale, torque.reshape(shape) / (scale * radius)
 
 
 def _floors(shape: tuple[int, ...]) -> tuple[Floats, Floats]:

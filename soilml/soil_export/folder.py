@@ -28,20 +28,12 @@ MOST_DRAWS = 9999
 class SoilExport:
     """A soil in the terms of a program.
 
-    Attributes
-    ----------
-    target
-        The program.
-    known
-        What the file knows of the soil, in SI units.
-    values
-        Parameters by the program's names, in its units.
-    draws
-        The same of each draw.
-    given
-        Parameters that the user gave, by name.
-    remarks
-        What limits the files: codes `not-determined`, `not-measured`, `effects-lost`, `defaulted`.
+    target: The program.
+    known: What the file knows of the soil, in SI units.
+    values, draws: Parameters by the program's names, in its units, and those of each draw.
+    given: Parameters that the user gave, by name.
+    remarks: What limits the files: codes `not-determined`, `not-measured`, `effects-lost`,
+        `defaulted`.
     """
 
     target: SoilTarget
@@ -57,12 +49,10 @@ class SoilExport:
         words: The words of the command line, for `export.json`.
         inputs: Files that were read.
         """
-        files = {name.format(""): text for name, text in self.target.files(self.values).items()}
+        files = self.target.written(self.values)
         digits = max(3, len(str(len(self.draws))))
         for number, values in enumerate(self.draws, 1):
-            label = f"_{number:0{digits}d}"
-            own = self.target.files(values)
-            files |= {name.format(label): text for name, text in own.items()}
+            files |= self.target.written(values, f"_{number:0{digits}d}")
         if self.draws:
             columns = {name: [draw[name] for draw in self.draws] for name in self.values}
             files[DRAWS] = csv_text(columns)
@@ -243,14 +233,13 @@ def readme(export: SoilExport, names: Sequence[str]) -> str:
         "| parameter | value | unit | known from | equation |",
         "|---|---|---|---|---|",
     ]
-    for own in target.mapped:
-        value = significant(export.values[own.name], 6)
-        row = (f"`{own.name}`", value, own.unit, export.origin(own.name), own.equation)
-        lines.append(f"| {' | '.join(row)} |")
-    for asked in target.asked:
-        value = significant(export.values[asked.name], 6)
-        reason = "given with --set" if asked.name in export.given else asked.reason
-        row = (f"`{asked.name}`", value, asked.unit, export.origin(asked.name), reason)
+    parameters = [(own.name, own.unit, own.equation) for own in target.mapped]
+    parameters += [
+        (own.name, own.unit, "given with --set" if own.name in export.given else own.reason)
+        for own in target.asked
+    ]
+    for name, unit, why in parameters:
+        row = (f"`{name}`", significant(export.values[name], 6), unit, export.origin(name), why)
         lines.append(f"| {' | '.join(row)} |")
     lines += _intervals(known)
     if target.ignored:

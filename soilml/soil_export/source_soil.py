@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-import math
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +17,8 @@ from soilml.fitting.coordinates import select_free
 from soilml.identification.posterior import prior_fractions
 from soilml.io.atomic_files import refuse_device
 from soilml.io.bounds import JSON_BYTES
+from soilml.io.declared_settings import take_declared
+from soilml.io.toml_settings import Settings
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
@@ -81,21 +81,11 @@ class SourceSoil:
 def read_source_soil(path: str | os.PathLike[str], run: str | None = None) -> SourceSoil:
     """The soil in the file that `soilml identify --out` wrote, or in a model file.
 
-    Parameters
-    ----------
-    path
-        A file whose name ends in .json or .toml.
-    run
-        Which result, where the file has one for each run.
+    path: A file whose name ends in .json or .toml.
+    run: Which result, where the file has one for each run.
 
-    Returns
-    -------
-    SourceSoil
-
-    Raises
-    ------
-    InputError
-        For a file that is neither, lacks the soil, or has several results and `run` names none.
+    Raises `InputError` for a file that is neither, lacks the soil, or has several results and `run`
+    names none.
     """
     file = Path(path)
     if file.suffix.lower() == ".toml":
@@ -114,115 +104,87 @@ def read_source_soil(path: str | os.PathLike[str], run: str | None = None) -> So
         raise InputError(f"{path} cannot be read: {error.strerror}") from None
     except ValueError:
         raise InputError(f"{path} is not JSON; needed is the file of `soilml identify`") from None
-    return _of_fit(_result(content, str(path), run), str(path))
-
-
-def _result(content: Any, path: str, run: str | None) -> Mapping[str, Any]:
-    """The entry of one fit; raises `InputError` where the file has none."""
     if not isinstance(content, dict) or not {"parameters", "runs"} & content.keys():
-        _no_fit(path)
+        raise InputError(f"{path} is no result of `soilml identify`; needed is its file of --out")
+    return _of_fit(_result(Settings(content, str(path)), run), str(path))
+
+
+def _result(content: Settings, run: str | None) -> Settings:
+    """The entry of one fit; raises `InputError` where the file has none of that name."""
     if "parameters" in content:
         if run is not None:
-            raise InputError(f"--run {run!r}: {path} has one result; omit it")
+            raise InputError(f"--run {run!r}: {content.where} has one result; omit it")
         return content
-    runs = content["runs"]
-    if not isinstance(runs, dict) or not runs:
-        _no_fit(path)
+    runs = content.table("runs")
+    names = ", ".join(runs.content)
     if run is None:
-        raise InputError(f"{path} has {len(runs)} results; name one with --run: {', '.join(runs)}")
+        content.fail(f"it has {len(runs.content)} results; name one with --run: {names}")
     if run not in runs:
-        raise InputError(f"{path} has no run {run!r}; {did_you_mean(run, runs)}there are: "
-                         f"{', '.join(runs)}")  # fmt: skip
-    entry = runs[run]
-    return entry if isinstance(entry, dict) else _no_fit(path)
+        hint = did_you_mean(run, runs.content)
+        content.fail(f"it has no run {run!r}; {hint}there are: {names}")
+    return runs.table(run)
 
 
-def _no_fit(path: str) -> NoReturn:
-    raise InputError(f"{path} is no result of `soilml identify`; needed is its file of --out")
-
-
-def _of_fit(fit: Mapping[str, Any], path: str) -> SourceSoil:
+def _of_fit(fit: Settings, path: str) -> SourceSoil:
     """The soil of one fit: identified values, and those that its model file fixed."""
-    if not isinstance(fit.get("model"), dict) or not isinstance(fit["model"].get("soil"), dict):
+    model = fit.table("model")
+    if "soil" not in model:
         raise InputError(
             f"{path} lacks model.soil, the values that were not identified: write it again with "
             "soilml identify --out"
         )
-    parameters = declared(Soil)
-    values = {name: _number(fit["model"]["soil"], name, path) for name in parameters}
-    origin = dict.fromkeys(parameters, "model file")
-    intervals, others, wide = {}, [], []
-    entries = fit.get("parameters")
-    if not isinstance(entries, dict):
-        _no_fit(path)
-    for name, entry in entries.items():
-        if not isinstance(entry, dict):
-            _no_fit(path)
-        if name not in parameters:
-            others.append(name)
-            continue
-        values[name], origin[name] = _number(entry, "value", path), "rows"
-        std, low, high = (_number(entry, key, path) for key in ("std", "p05", "p95"))
-        intervals[name] = std, low, high
-        if entry.get("remaining_fraction", 0.0) > NOT_IDENTIFIED_ABOVE:
+    stated = take_declared(Soil, model.table("soil"))
+    values = {name: float(getattr(stated, name)) for name in declared(Soil)}
+    origin = dict.fromkeys(values, "model file")
+    intervals, wide = dict[str, tuple[float, float, float]](), list[str]()
+    entries = fit.table("parameters")
+    for name in [name for name in entries.content if name in values]:
+        entry = entries.table(name)
+        values[name], origin[name] = entry.number("value"), "rows"
+        intervals[name] = entry.number("std"), entry.number("p05"), entry.number("p95")
+        if entry.number("remaining_fraction", 0.0) > NOT_IDENTIFIED_ABOVE:
             wide.append(name)
-    _check_bounds(values, path)
-    said = _remarks(fit.get("warnings", []))
+    others = [name for name in entries.content if name not in values]
+    said = [
+        Remark(str(e.get("code")), "", tuple(map(str, e.get("about", ()))))
+        for e in fit.take("warnings", list, "a list of remarks", [])
+        if isinstance(e, dict)
+    ]
     warned = about(said, "not-identified") | about(said, "few-readings")
     wide += [name for name in intervals if name in warned and name not in wide]
     remarks = []
     if wide:
         text = f"the rows do not determine {', '.join(wide)}: one file hides that, --draws shows it"
         remarks.append(Remark("not-determined", text, tuple(wide)))
-    effects = [*fit["model"].get("effects", []), *others]
-    if effects:
-        text = f"the fit has {', '.join(effects)}: no target knows these, and forces will differ"
-        remarks.append(Remark("effects-lost", text, tuple(effects)))
-    draws = _draws(fit.get("draws"), parameters, path)
+    remarks += _lost_effects([*model.take("effects", list, "a list of names", []), *others])
+    draws = _draws(fit.take("draws", dict, "lists of numbers by name", {}), path)
     why = "only averaged and posterior of `soilml identify` draw samples, and not with --by"
     return SourceSoil(path, values, origin, intervals, draws, tuple(remarks), "" if draws else why)
 
 
-def _remarks(entries: Any) -> list[Remark]:
-    """Remarks of a file of results, of which code and names count."""
-    known = [entry for entry in entries if isinstance(entry, dict)]
-    return [Remark(str(e.get("code")), "", tuple(map(str, e.get("about", ())))) for e in known]
+def _lost_effects(names: list[str]) -> list[Remark]:
+    text = f"the model has {', '.join(names)}: no target knows these, and forces will differ"
+    return [Remark("effects-lost", text, tuple(names))] if names else []
 
 
-def _draws(entry: Any, parameters: Mapping[str, Any], path: str) -> dict[str, Floats]:
+def _draws(entry: dict[str, Any], path: str) -> dict[str, Floats]:
     """Draws (count,) of the soil's parameters; empty where the file has none."""
-    if not isinstance(entry, dict):
-        return {}
+    bounds = declared(Soil)
     try:
-        found = {n: np.asarray(v, dtype=np.float64) for n, v in entry.items() if n in parameters}
+        found = {n: np.asarray(v, dtype=np.float64) for n, v in entry.items() if n in bounds}
+        right = all(
+            own.ndim == 1 and np.all((own >= bounds[n].lower) & (own <= bounds[n].upper))
+            for n, own in found.items()
+        )
     except (TypeError, ValueError):
-        _no_fit(path)
-    bounds = [(own, parameters[name]) for name, own in found.items()]
-    if len({own.shape for own in found.values()}) > 1 or not all(
-        own.ndim == 1 and own.size and np.all((own >= p.lower) & (own <= p.upper))
-        for own, p in bounds
-    ):
+        found, right = {}, False
+    sizes = {own.size for own in found.values()}
+    if not right or len(sizes) > 1 or 0 in sizes:
         raise InputError(
             f"{path}: draws must be lists of numbers of one length within the bounds of the soil; "
             "write it again with soilml identify --out"
         )
     return found
-
-
-def _number(entry: Mapping[str, Any], key: str, path: str) -> float:
-    value = entry.get(key)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{path}: {key} is {value!r}; needed is a number")
-    return float(value)
-
-
-def _check_bounds(values: Mapping[str, float], path: str) -> None:
-    for name, parameter in declared(Soil).items():
-        if not parameter.lower <= values[name] <= parameter.upper:
-            raise InputError(
-                f"{path}: {name} is {values[name]:g}; it must lie between {parameter.lower:g} and "
-                f"{parameter.upper:g} {parameter.unit}"
-            )
 
 
 def _of_case(case: Case, path: str) -> SourceSoil:
@@ -240,9 +202,6 @@ def _of_case(case: Case, path: str) -> SourceSoil:
         free = select_free(case, unknown)
         u = prior_fractions(free, PRIOR_DRAWS, np.random.default_rng(0), case)
         draws = {f.path: np.asarray(f.prior.at(u[:, i])) for i, f in enumerate(free)}
-    effects = tuple(effect.name for effect in case.model.effects)
-    if effects:
-        text = f"the model has {', '.join(effects)}: no target knows these, and forces will differ"
-        remarks.append(Remark("effects-lost", text, effects))
+    remarks += _lost_effects([effect.name for effect in case.model.effects])
     why = "" if draws else "its parameters have no prior in [soil.prior]"
     return SourceSoil(path, values, origin, {}, draws, tuple(remarks), why)

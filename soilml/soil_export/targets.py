@@ -48,27 +48,16 @@ class AskedParameter:
 class SoilTarget:
     """A program, or a part of one.
 
-    Attributes
-    ----------
-    name
-        What `--to` takes.
-    program
-        What it is, with the version or file that was read.
-    sources
-        Addresses of the documentation that units and equations are taken from.
-    mapped, asked
-        Its parameters.
-    ignored
-        Why it has no use for parameters of the soil, by name.
-    files
-        Text of each file from values by the program's names; `{}` in a file's name stands for the
-        label of a draw.
-    loading
-        How the program reads the files, as Markdown.
-    lost
-        What of the wheel's behaviour the program cannot show, in sentences.
-    check
-        Raises `InputError` for values that the program would misread.
+    name: What `--to` takes.
+    program: What it is, with the version or file that was read.
+    sources: Addresses of the documentation that units and equations are taken from.
+    mapped, asked: Its parameters.
+    ignored: Why it has no use for parameters of the soil, by name.
+    files: By name, in which `{}` stands for the label of a draw: a text with values by the
+        program's names, or what makes one of them.
+    loading: How the program reads the files, as Markdown.
+    lost: What of the wheel's behaviour the program cannot show, in sentences.
+    check: Raises `InputError` for values that the program would misread.
     """
 
     name: str
@@ -77,10 +66,17 @@ class SoilTarget:
     mapped: tuple[MappedParameter, ...]
     asked: tuple[AskedParameter, ...]
     ignored: dict[str, str]
-    files: Callable[[Values], dict[str, str]]
+    files: Mapping[str, str | Callable[[Values], str]]
     loading: str
     lost: tuple[str, ...]
     check: Callable[[Values], None] = lambda values: None
+
+    def written(self, values: Values, label: str = "") -> dict[str, str]:
+        """The text of each file by its name."""
+        return {
+            name.format(label): text.format(**values) if isinstance(text, str) else text(values)
+            for name, text in self.files.items()
+        }
 
     @property
     def units(self) -> dict[str, str]:
@@ -112,21 +108,16 @@ def _same(name: str, unit: str, soil: str, equation: str) -> MappedParameter:
     return MappedParameter(name, unit, equation, (soil,), lambda v: v[soil])
 
 
-def _friction(name: str) -> MappedParameter:
-    equation = "tan(friction_angle)"
-    return MappedParameter(
-        name, "1", equation, ("friction_angle",), lambda v: math.tan(v["friction_angle"])
-    )
+_TAN = ("1", "tan(friction_angle)", math.tan)
+_DEGREES = (
+    "deg", "180/pi friction_angle, of Mohr-Coulomb: tau_max = c + sigma tan(phi)", math.degrees
+)  # fmt: skip
 
 
-def _degrees(name: str) -> MappedParameter:
-    return MappedParameter(
-        name,
-        "deg",
-        "180/pi friction_angle, of Mohr-Coulomb: tau_max = c + sigma tan(phi)",
-        ("friction_angle",),
-        lambda v: math.degrees(v["friction_angle"]),
-    )
+def _angle(name: str, unit: str, equation: str, value: Callable[[float], float]) -> MappedParameter:
+    """A function of the friction angle."""
+    of_angle = ("friction_angle",)
+    return MappedParameter(name, unit, equation, of_angle, lambda v: value(v["friction_angle"]))
 
 
 _STRESS_ANGLE = "the pressure along the contact follows from depth, without an angle of its own"
@@ -140,32 +131,60 @@ _SCM_KEYS = {
 }  # fmt: skip
 
 
-def _scm_files(values: Values) -> dict[str, str]:
+def _scm(values: Values) -> str:
     content = {
         "Name": "Soil by soilml",
         "Type": "Terrain Properties",
         "Template": "SCM Soil Parameters",
         "Soil Parameters": {key: values[name] for name, key in _SCM_KEYS.items()},
     }
-    return {"scm_soil{}.json": json_text(content)}
+    return json_text(content)
 
 
-def _crm_files(values: Values) -> dict[str, str]:
-    return {"crm_soil{}.json": json_text(dict(values))}
+def _csv(values: Values) -> str:
+    units = [declared(Soil)[name].unit for name in values]
+    return csv_text({"parameter": list(values), "value": list(values.values()), "unit": units})
 
 
-def _gazebo_files(values: Values) -> dict[str, str]:
-    rows = [f"  {key}: {values[key]:.9g}" for key in ("k_c", "k_phi", "c", "phi", "K", "rho", "n")]
-    mu = f"{values['mu']:.9g}"
-    surface = (
-        '<?xml version="1.0"?>\n<surface>\n  <friction>\n    <ode>\n'
-        f"      <mu>{mu}</mu>\n      <mu2>{mu}</mu2>\n"
-        "    </ode>\n  </friction>\n</surface>\n"
-    )
-    return {
-        "soil_params{}.yaml": "\n".join(["soilml:", "  k: 0.0", *rows]) + "\n",
-        "surface{}.sdf": surface,
-    }
+_GAZEBO_PLUGIN = """\
+soilml:
+  k: 0.0
+  k_c: {k_c:.9g}
+  k_phi: {k_phi:.9g}
+  c: {c:.9g}
+  phi: {phi:.9g}
+  K: {K:.9g}
+  rho: {rho:.9g}
+  n: {n:.9g}
+"""
+_SDF_SURFACE = """\
+<?xml version="1.0"?>
+<surface>
+  <friction>
+    <ode>
+      <mu>{mu:.9g}</mu>
+      <mu2>{mu:.9g}</mu2>
+    </ode>
+  </friction>
+</surface>
+"""
+_USD_MATERIAL = """\
+#usda 1.0
+(
+    defaultPrim = "Soil"
+    doc = "Friction of a soil by soilml"
+)
+
+def Material "Soil" (
+    prepend apiSchemas = ["PhysicsMaterialAPI", "PhysxMaterialAPI"]
+)
+{{
+    float physics:staticFriction = {staticFriction:.9g}
+    float physics:dynamicFriction = {dynamicFriction:.9g}
+    float physics:restitution = {restitution:.9g}
+    uniform token physxMaterial:frictionCombineMode = "multiply"
+}}
+"""
 
 
 def _check_gazebo(values: Values) -> None:
@@ -216,7 +235,7 @@ _CHRONO_SCM = SoilTarget(
         _same("Bekker_Kc", "N/m^(n+1)", "kc", "kc; 1/b is perimeter / (2 area) of the contact"),
         _same("Bekker_n", "1", "n", "n"),
         _same("Mohr_cohesion", "Pa", "cohesion", "cohesion, of tau_max = c + sigma tan(phi)"),
-        _degrees("Mohr_friction"),
+        _angle("Mohr_friction", *_DEGREES),
         _same("Janosi_shear", "m", "shear_modulus", "K, of tau = tau_max (1 - exp(-j/K))"),
     ),
     asked=(
@@ -231,11 +250,10 @@ _CHRONO_SCM = SoilTarget(
         ),
     ),
     ignored={
-        "a0": _STRESS_ANGLE,
-        "a1": _STRESS_ANGLE,
+        **dict.fromkeys(("a0", "a1"), _STRESS_ANGLE),
         "unit_weight": "SCM has no weight of the soil; bulldozing has parameters of its own",
     },
-    files=_scm_files,
+    files={"scm_soil{}.json": _scm},
     loading="""\
 ```
 import json
@@ -263,8 +281,8 @@ _CHRONO_CRM = SoilTarget(
             "density", "kg/m^3", "unit_weight / 9.80665 m/s^2", ("unit_weight",),
             lambda v: v["unit_weight"] / 9.80665,
         ),
-        _friction("mu_fric_s"),
-        _friction("mu_fric_2"),
+        _angle("mu_fric_s", *_TAN),
+        _angle("mu_fric_2", *_TAN),
         _same("cohesion_coeff", "Pa", "cohesion", "cohesion, of tau_max = mu p + c"),
     ),
     asked=(
@@ -275,10 +293,9 @@ _CHRONO_CRM = SoilTarget(
     ),
     ignored=dict.fromkeys(("kc", "kphi", "n"), _NO_BEARING) | {
         "shear_modulus": "CRM shears by its Young's modulus, not by a displacement K",
-        "a0": _STRESS_ANGLE,
-        "a1": _STRESS_ANGLE,
+        **dict.fromkeys(("a0", "a1"), _STRESS_ANGLE),
     },
-    files=_crm_files,
+    files={"crm_soil{}.json": lambda values: json_text(dict(values))},
     loading="""\
 Set the fields of these names of `SoilProperties` (`ElasticMaterialProperties` in earlier versions),
 and leave the rheology at `MU_OF_I`.
@@ -301,18 +318,17 @@ _GAZEBO = SoilTarget(
         _same("k_c", "N/m^(n+1)", "kc", "kc; the plugin takes k = k_c / b + k_phi"),
         _same("k_phi", "N/m^(n+2)", "kphi", "kphi"),
         _same("c", "Pa", "cohesion", "cohesion"),
-        _degrees("phi"),
+        _angle("phi", *_DEGREES),
         _same("K", "m", "shear_modulus", "K, of tau = (c + sigma tan(phi)) (1 - exp(-j/K))"),
         _same("rho", "N/m^3", "unit_weight", "unit_weight: rho is a weight, for bulldozing"),
         _same("n", "1", "n", "n"),
-        _friction("mu"),
+        _angle("mu", *_TAN),
     ),
     asked=(),
-    ignored={
-        "a0": "gz-terramechanics puts the maximum stress at half the entry angle",
-        "a1": "gz-terramechanics puts the maximum stress at half the entry angle",
-    },
-    files=_gazebo_files,
+    ignored=dict.fromkeys(
+        ("a0", "a1"), "gz-terramechanics puts the maximum stress at half the entry angle"
+    ),
+    files={"soil_params{}.yaml": _GAZEBO_PLUGIN, "surface{}.sdf": _SDF_SURFACE},
     loading="""\
 Take one of the two, not both: the plugin expects wheels without friction of their own.
 
@@ -335,7 +351,7 @@ _ISAAC = SoilTarget(
         "https://nvidia-omniverse.github.io/PhysX/physx/5.6.0/_api_build/structPxCombineMode.html",
         "https://openusd.org/release/api/class_usd_physics_material_a_p_i.html",
     ),
-    mapped=(_friction("staticFriction"), _friction("dynamicFriction")),
+    mapped=(_angle("staticFriction", *_TAN), _angle("dynamicFriction", *_TAN)),
     asked=(
         AskedParameter("restitution", "1", 0.0, "not measured; the default of USD: no rebound"),
     ),
@@ -343,7 +359,7 @@ _ISAAC = SoilTarget(
         ("cohesion", "shear_modulus", "kc", "kphi", "n", "a0", "a1", "unit_weight"),
         "PhysX has no soil model: the ground is rigid, and friction has no cohesion",
     ),
-    files=_isaac_files,
+    files={"soil_material{}.usda": _USD_MATERIAL},
     loading="""\
 Reference `soil_material.usda` in the stage and bind `/Soil` to the ground as physics material.
 Give the wheels a friction of 1: the combine mode is multiply, so that the pair has the soil's.
@@ -373,7 +389,7 @@ _CSV = SoilTarget(
     ),
     asked=(),
     ignored={},
-    files=_csv_files,
+    files={"soil{}.csv": _csv},
     loading="Rows are parameters, in SI units; angles are in radians.\n",
     lost=(),
 )

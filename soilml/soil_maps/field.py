@@ -12,6 +12,7 @@ from soilml.config.case import Case
 from soilml.soil_maps.local_soils import LocalSoils, soil_values
 from soilml.traction.draws import SoilDraws
 from soilml.traction.rover_performance import on_slopes
+from soilml.traction.soil_draws import mixed_prior_draws
 
 #: Shares of the variance of a patch that is local, correlation lengths of this part over the
 #: largest distance between stretches, shares of the rest that all patches have in common, and
@@ -226,6 +227,8 @@ def map_ability(
 
     .. math:: w_k(x) \propto \frac{p_x(z_k)}{q(z_k)}, \quad q = \frac1n \sum_x p_x
 
+    Of several explanations, each draw has the effects of one, with its probability.
+
     mean, covariance: Of the scores, (n, p) and (n, p, p).
     slope: Slopes (m,), rad, from 0 to 60 degrees.
 
@@ -238,10 +241,13 @@ def map_ability(
     root = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
     own = np.resize(rng.permutation(n), DRAWS)
     draws = mean[own] + np.einsum("kij,kj->ki", root[own], rng.standard_normal((DRAWS, p)))
-    names = tuple(f.path for f in soils.free)
-    _, found = on_slopes(
-        case, SoilDraws(names, soil_values(soils.free, draws)), slope, SLIP_LIMIT * SLIPS
-    )
+    names, values = [f.path for f in soils.free], soil_values(soils.free, draws)
+    if case.explanations:
+        case, mixed = mixed_prior_draws(case, DRAWS)
+        effects = [i for i, path in enumerate(mixed.names) if "." in path]
+        names += [mixed.names[i] for i in effects]
+        values = np.concatenate([values, mixed.values[:, effects]], axis=1)
+    _, found = on_slopes(case, SoilDraws(tuple(names), values), slope, SLIP_LIMIT * SLIPS)
     climbs = found["margin"] >= 0.0
     outcomes = [climbs * 1.0, *(np.where(climbs, np.nan_to_num(found[name]), 0.0)
                                 for name in ("slip", "energy"))]  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
 from soilml.errors import FitError, TableError
 from soilml.fitting.coordinates import Coordinate
-from soilml.io.read_table import Rows, as_table
+from soilml.fitting.operating_points import with_rover_columns
+from soilml.io.read_table import Rows, as_table, check_table
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.onboard.estimate import Estimate, Reason
@@ -275,24 +277,18 @@ def read_map_drive(table: Rows, case: Case) -> MapDrive:
     jumps, and `FitError` for too few rows.
     """
     table = as_table(table)
-    for name in NEEDED:
-        if name not in table:
-            raise TableError(
-                f"{table.source}: column {name} is missing; soilml drive map needs "
-                f"{', '.join(NEEDED)}"
-            )
-    for name in ("x_m", "y_m"):
-        blank = ~np.isfinite(table[name])
-        if blank.any():
-            cell = table.place(int(np.argmax(blank)))
-            raise TableError(f"{cell}, column {name}: the position is missing; remove such rows")
+    posed = case.rover is not None and "wheel" in table and "heading_rad" in table
+    filled = (*NEEDED[:2], *(("heading_rad",) if posed else ()))
+    table = check_table(table, Path(table.source), NEEDED, filled, None)
     table = table.rows(table.answered & np.isfinite([table[name] for name in NEEDED]).all(axis=0))
     if len(table) < LEAST_OF_DRIVE:
         raise FitError(
             f"{table.source}: {len(table)} rows with position, slip, torque and load; a map needs "
             f"{LEAST_OF_DRIVE} or more"
         )
-    place = _places(table, case)
+    place: Floats = np.column_stack([table["x_m"], table["y_m"]])
+    if posed:
+        place = place + _contacts(with_rover_columns(case, table), case)
     wheels, wheel = np.unique(
         table["wheel"] if "wheel" in table else np.zeros(len(table)), return_inverse=True
     )
@@ -310,27 +306,13 @@ def read_map_drive(table: Rows, case: Case) -> MapDrive:
     return MapDrive(rows, place[order], station[order], wheel[order], order, table.source)
 
 
-def _places(table: Table, case: Case) -> Floats:
-    """Places (n, 2) of the contacts, m."""
-    place: Floats = np.column_stack([table["x_m"], table["y_m"]])
-    if case.rover is None or "wheel" not in table or "heading_rad" not in table:
-        return place
-    known = case.rover.wheels
-    unknown = ~np.isin(table["wheel"], list(known))
-    if unknown.any():
-        row = int(np.argmax(unknown))
-        raise TableError(
-            f"{table.place(row)}, column wheel: {str(table['wheel'][row])!r}; wheels of [rover] "
-            f"are: {', '.join(known)}"
-        )
-    heading = table["heading_rad"]
-    if not np.isfinite(heading).all():
-        row = int(np.argmin(np.isfinite(heading)))
-        raise TableError(f"{table.place(row)}, column heading_rad: the cell is blank")
+def _contacts(table: Table, case: Case) -> Floats:
+    """Places (n, 2) of the contacts from the rover's origin, m."""
+    assert case.rover is not None
+    known, heading = case.rover.wheels, table["heading_rad"]
     cos, sin = np.cos(heading), np.sin(heading)
     ahead, left = np.asarray([(known[n].forward, known[n].left) for n in table["wheel"]]).T
-    turned = np.column_stack([ahead * cos - left * sin, ahead * sin + left * cos])
-    return np.asarray(place + turned)
+    return np.column_stack([ahead * cos - left * sin, ahead * sin + left * cos])
 
 
 def _stations(table: Table, time: Floats, place: Floats) -> Floats:

@@ -221,7 +221,7 @@ def soil_map(
     TableError, FitError
         As `read_map_drive`, `follow` and `local_soils` do.
     """
-    case, (low, high) = as_case(case, with_explanations=False), SIZES
+    case, (low, high) = as_case(case), SIZES
     if not (low <= cell <= high and low <= reach <= high):
         raise InputError(
             f"cell is {cell:g} m and reach {reach:g} m; needed are {low:g} to {high:g} m"
@@ -231,7 +231,14 @@ def soil_map(
     own = Estimator.load(MODEL) if estimator is None else estimator
     if own.sets is None:
         raise InputError(f"{own.path} has no set posterior; train it with [set_posterior]")
-    (own,), notes = estimators_for_case([own], case, "the model file", pooled=True)
+    alone = case.without_explanations()
+    (own,), notes = estimators_for_case([own], alone, "the model file", pooled=True)
+    if case.explanations:
+        text = (
+            "the rover has the effects of each [[explanation]] as likely as it is; the soil is "
+            "that of the trained file, without them"
+        )
+        notes.append(Remark("suspected", text))
     tell = progress or (lambda stage, done, total: None)
     drive = read_map_drive(rows, case)
     grid = MapGrid.around(drive.place, cell, reach)
@@ -258,7 +265,7 @@ def soil_map(
     held_out = None
     if score:
         tell("predicting stretches held out", 0, 1)
-        held_out = held_out_score(case, with_exact_sensors(own), drive, followed, soils)
+        held_out = held_out_score(alone, with_exact_sensors(own), drive, followed, soils)
         tell("predicting stretches held out", 1, 1)
     return SoilMap(
         drive, followed, soils, field, grid, known, mean, covariance, ability, pitch, by_heading,

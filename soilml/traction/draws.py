@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.config.measurement_noise import range_with_zero
-from soilml.fitting.operating_points import operating_points, rows_by_gear
 from soilml.fitting.predictions import forces_of_one_gear
-from soilml.fitting.readings import declared_std
-from soilml.io.table import Table
-from soilml.numerics.smooth_process import SmoothFunctions, process_columns, slip_load_points
+from soilml.numerics.smooth_process import SmoothFunctions
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import Operating
-from soilml.quantities import CHANNELS, column
 
 
 @dataclass(frozen=True)
@@ -100,137 +95,15 @@ class SoilDraws:
         slip, load = (np.asarray(v, dtype=np.float64) for v in (at.slip, at.load))
         return self.errors.added_to(force, gear, draw, slip, load)
 
+    def on_grid(
+        self, case: Case, load: Floats, slip: Floats, gear: str = "", **others: Any
+    ) -> Force:
+        """Forces (..., n, m) of each draw at loads (..., n), N, and slips (m,).
 
-#: Loads down to this share of the smallest are in the range of the errors: those on a slope.
-ON_SLOPES = 0.5
-#: Name of the gear of a case with one.
-ONE_GEAR = ""
-
-
-def draw_model_errors(
-    case: Case,
-    table: Table,
-    draws: SoilDraws,
-    slip: Floats,
-    load: Sequence[float],
-    *,
-    channels: Sequence[str] = CHANNELS,
-    noise_scale: float | None = 1.0,
-) -> tuple[DrawnErrors, DrawnErrors] | None:
-    r"""Draws of the errors given the rows, and before them; None where no channel has one.
-
-    A [remainder] of a channel takes the place of what [discrepancy] declares, about its mean, which
-    is in the predictions. The error is C w with the columns C of the process and standard normal
-    weights w. Given the soil of a draw, the k measured readings leave residuals r with noise D, and
-    the weights are normal with
-
-    .. math:: E[w] = M^{-1} B^T D^{-1} r, \quad \operatorname{cov}[w] = M^{-1}, \quad
-        M = I + B^T B, \quad B = D^{-1} C
-
-    case: Model, noise and discrepancy.
-    table: Rows with status ok. A share of the range is that of their readings, or, where the
-        channel was not measured, of the median prediction for these rows.
-    draws: Draws of the soil, given the same rows.
-    slip, load: Slips and loads (N) at which errors are asked for.
-    noise_scale: Factor on noise and discrepancy; None to leave the readings out.
-
-    References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. 2.7 and
-    2.8.
-    """
-    slips, loads = np.append(table["slip"], slip), np.append(table["load_N"], load)
-    ranges = _ends(slips), (ON_SLOPES * float(loads.min()), float(loads.max()))
-    functions = _functions(case, table, draws, channels, ranges)
-    if not functions:
-        return None
-    rng, after, before = np.random.default_rng(0), {}, {}
-    scale = 1.0 if noise_scale is None else noise_scale
-    for (channel, gear), own in functions.items():
-        normal = rng.standard_normal((2, len(draws.values), own.count))
-        residual, std, rows = _residuals(case, table, draws, channel, gear)
-        used = np.zeros(len(rows), bool) if noise_scale is None else std > 0.0
-        std, residual, rows = std[used], residual[:, used], rows[used]
-        basis = own.at(table["slip"][rows], table["load_N"][rows]) / std[:, None]
-        precision = np.eye(own.count) + basis.T @ basis
-        mean = np.linalg.solve(precision, basis.T @ (residual / std).T).T
-        # with M = L L^T, the weights L^-T z have the covariance M^-1
-        spread = np.linalg.solve(np.linalg.cholesky(precision).T, normal[1].T).T
-        after[channel, gear], before[channel, gear] = mean + scale * spread, scale * normal[0]
-    return DrawnErrors(functions, after, *ranges), DrawnErrors(functions, before, *ranges)
-
-
-def _functions(
-    case: Case,
-    table: Table,
-    draws: SoilDraws,
-    channels: Sequence[str],
-    ranges: tuple[tuple[float, float], tuple[float, float]],
-) -> dict[tuple[str, str], SmoothFunctions]:
-    """The functions of each channel and gear that has an error."""
-    found = {}
-    for name in channels:
-        key, learned = column(name), case.remainder
-        own = case.discrepancy.get(key)
-        for gear in _gears(case):
-            if learned is not None and key in learned.columns:
-                if learned.of(name, gear):
-                    found[name, gear] = learned.error_functions(name, *ranges, gear)
-            elif own is not None:
-                lengths = own.slip_length, own.log_load_length
-                amplitude = own.amplitude(_range(case, table, draws, name))
-                columns = partial(_declared_columns, lengths, amplitude)
-                found[name, gear] = SmoothFunctions.of(columns, lengths, *ranges)
-    return found
-
-
-def _declared_columns(
-    lengths: tuple[float, float], amplitude: float, slip: Floats, load: Floats
-) -> Floats:
-    return process_columns(slip_load_points(slip, load, *lengths), amplitude)
-
-
-def _range(case: Case, table: Table, draws: SoilDraws, channel: str) -> float:
-    """Range of a channel's readings, or of its median predictions at the rows."""
-    key = column(channel)
-    if key in table and np.isfinite(table[key]).any():
-        return range_with_zero(table[key])
-    predicted = [_predicted(case, table, draws, channel, gear)[0] for gear in _gears(case)]
-    return range_with_zero(np.concatenate([np.median(own, axis=0) for own in predicted]))
-
-
-def _gears(case: Case) -> list[str]:
-    return list(case.gears) or [ONE_GEAR]
-
-
-def _residuals(
-    case: Case, table: Table, draws: SoilDraws, channel: str, gear: str
-) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Residuals (n, k) of a gear's measured rows, their noise (k,), and their positions (k,)."""
-    key = column(channel)
-    if key not in table:
-        return np.zeros((len(draws.values), 0)), np.zeros(0), np.zeros(0, np.int64)
-    predicted, rows = _predicted(case, table, draws, channel, gear)
-    reading, std = table[key][rows], np.nan_to_num(declared_std(case, table, key)[rows])
-    known = np.isfinite(reading)
-    return np.nan_to_num(reading - predicted)[:, known], std[known], rows[known]
-
-
-def _predicted(
-    case: Case, table: Table, draws: SoilDraws, channel: str, gear: str
-) -> tuple[Floats, NDArray[np.int64]]:
-    """A channel (n, k) of each draw at the rows of a gear, and their positions (k,).
-
-    NaN where the soil does not carry the load.
-    """
-    soils = draws.of(case, np.arange(len(draws.values))[:, None])
-    at, rows = operating_points(table), np.arange(len(table))
-    if gear != ONE_GEAR:
-        own = [p for p in rows_by_gear(soils, at) if p.name == gear]
-        if not own:
-            return np.zeros((len(draws.values), 0)), np.zeros(0, np.int64)
-        soils, at, rows = own[0].case, own[0].at, own[0].rows
-    found = getattr(forces_of_one_gear(soils, at), channel)
-    return np.broadcast_to(np.asarray(found), (len(draws.values), len(rows))), rows
-
-
-def _ends(values: Floats) -> tuple[float, float]:
-    return float(values.min()), float(values.max())
+        others: Further fields of `Operating`, alike for all.
+        """
+        shape = (*load.shape, len(slip))
+        *_, draw, column = (grid.ravel() for grid in np.indices(shape))
+        at = Operating(slip=slip[column], load=np.repeat(load.ravel(), len(slip)), **others)
+        force = self.forces(case, draw, at, gear)
+        return Force(**{f.name: np.reshape(getattr(force, f.name), shape) for f in fields(Force)})

@@ -25,6 +25,7 @@ from soilml.remarks import Remark
 from soilml.row_status import Status
 from soilml.traction.draws import SoilDraws
 from soilml.traction.gravity import LawComparison, compare_laws, draws_at_gravity
+from soilml.traction.measured_range import MeasuredRange, extrapolations
 
 #: Upper end of the slopes searched, rad (86 degrees); steeper ones are clipped to it.
 LARGEST_SLOPE = 1.5
@@ -185,44 +186,7 @@ def _largest(values: Floats) -> Floats:
     return np.where(np.isfinite(largest), largest, np.nan)
 
 
-#: Extrapolation beyond the measured slips (difference) and loads (factor) that is reported.
-SLIP_MARGIN, LOAD_FACTOR = 0.1, 1.25
 OVERTURNING_SLOPE = 0.7854  # Slope, rad (45 degrees), beyond which vehicles overturn
-_NOT_INCLUDED = "all wheels equal, no load transfer, no side slope"  # What no band includes
-#: Relative difference up to which loads of rows count as equal: noise of a nominal load.
-SAME_LOAD = 0.1
-MOST_LOADS = 3  # Number of loads predicted by default: the lightest, one between, the heaviest
-#: Default highest slip where no row has a higher one, and number of slips of a curve.
-DEFAULT_SLIP_LIMIT, SLIPS = 0.6, 12
-
-
-@dataclass(frozen=True)
-class MeasuredRange:
-    """Lowest and highest slip, lightest and heaviest load (N) of the rows."""
-
-    slip: tuple[float, float]
-    load: tuple[float, float]
-
-    @staticmethod
-    def of(slip: Floats, load: Floats) -> MeasuredRange:
-        """Those of rows (m,)."""
-        ends = ((float(v.min()), float(v.max())) for v in (slip, load))
-        return MeasuredRange(*ends)
-
-
-def limitations(pull_error: float | None) -> Remark:
-    """What the bands include; `pull_error` is the declared error of the pull, N, if there is one.
-
-    >>> print(limitations(0.4))
-    bands include the uncertainty of the soil, the noise and errors of the model (drawbar pull 0.4 N
-    before any reading); all wheels equal, no load transfer, no side slope
-    """
-    if pull_error is None:
-        included = "the uncertainty of the soil and the noise, not errors of the model"
-    else:
-        error = f"drawbar pull {pull_error:.3g} N before any reading"
-        included = f"the uncertainty of the soil, the noise and errors of the model ({error})"
-    return Remark("band-content", f"bands include {included}; {_NOT_INCLUDED}", severity="note")
 
 
 def prediction_warnings(
@@ -237,8 +201,8 @@ def prediction_warnings(
     `error_included` is whether the draws include a declared error of the pull.
     """
     yield from _identifiability(remaining_fraction)
-    yield from _extrapolation(prediction, measured, error_included)
     failed, load = prediction.failed_fraction, prediction.load
+    yield from extrapolations(prediction.slip, np.asarray(load), measured, error_included)
     if failed > 0.0:
         text = f"{failed:.0%} of the soils and slips do not carry {load:.4g} N and are excluded"
         yield Remark("not-carried", text)
@@ -264,27 +228,6 @@ def _identifiability(remaining_fraction: tuple[float, float]) -> Iterator[Remark
             yield Remark("not-identified", text, (name,))
         elif fraction > WEAKLY_IDENTIFIED_ABOVE:
             yield Remark("weakly-identified", f"the {name} is weakly identified: {width}", (name,))
-
-
-def _extrapolation(
-    prediction: Traction, measured: MeasuredRange, error_included: bool
-) -> Iterator[Remark]:
-    error = "may be larger here than [discrepancy] says" if error_included else "is not in the band"
-    note = f"extrapolated by the model, whose error {error}"
-    low, high = measured.slip
-    if prediction.slip[-1] > high + SLIP_MARGIN:
-        text = f"no slip above {high:.2g} was measured: {note}"
-        yield Remark("extrapolated", text)
-    if prediction.slip[0] < low - SLIP_MARGIN:
-        text = f"no slip below {low:.2g} was measured: {note}"
-        yield Remark("extrapolated", text)
-    load, (light, heavy) = prediction.load, measured.load
-    if load > LOAD_FACTOR * heavy:
-        text = f"no load above {heavy:.3g} N was measured, predicted is {load:.3g} N: {note}"
-        yield Remark("extrapolated", text)
-    if load < light / LOAD_FACTOR:
-        text = f"no load below {light:.3g} N was measured, predicted is {load:.3g} N: {note}"
-        yield Remark("extrapolated", text)
 
 
 @dataclass(frozen=True)
@@ -356,26 +299,6 @@ def _answers(
         "steepest_deg": np.rad2deg(found.steepest_slope),
         f"sinkage_mm_slip_{slip[middle]:.2g}": 1e3 * found.sinkage[:, middle],
     }
-
-
-def measured_loads(load: Floats) -> list[float]:
-    """The loads (N) of rows, groups of equal ones as their mean, at most `MOST_LOADS`."""
-    ordered = np.sort(load)
-    groups = np.split(ordered, 1 + np.flatnonzero(np.diff(ordered) > SAME_LOAD * ordered[1:]))
-    means = [float(group.mean()) for group in groups]
-    index = np.linspace(0, len(means) - 1, min(len(means), MOST_LOADS)).round().astype(int)
-    return [means[i] for i in index]
-
-
-def slip_grid(limit: float | None, measured: MeasuredRange) -> Floats:
-    """Slips (m,) up to a limit; by default to the highest measured slip, at least to 0.6.
-
-    Raises `InputError` for a limit that is not between 0 and 1.
-    """
-    if limit is not None and not 0.0 < limit < 1.0:
-        raise InputError(f"slip limit {limit:g}; needed is a slip between 0 and 1")
-    top = max(DEFAULT_SLIP_LIMIT, measured.slip[1]) if limit is None else limit
-    return np.asarray(top * np.arange(1, SLIPS + 1) / SLIPS)
 
 
 def _width_ratio(posterior: Floats, prior: Floats) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,22 +25,26 @@ from soilml.report.numbers import format_quantity, format_range, significant
 from soilml.report.report import Picture, Report
 from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
-from soilml.traction.draws import ON_SLOPES
 from soilml.traction.gravity import gravity_remark
-from soilml.traction.pull_and_slope import (
+from soilml.traction.measured_range import (
     SAME_LOAD,
-    LoadPrediction,
     MeasuredRange,
-    Traction,
-    excluded_effects,
-    limitations,
+    band_content,
     measured_loads,
-    predictions_by_load,
     slip_grid,
 )
-from soilml.traction.soil_draws import measured_soil, prior_draws
+from soilml.traction.pull_and_slope import (
+    LoadPrediction,
+    Traction,
+    excluded_effects,
+    predictions_by_load,
+)
+from soilml.traction.soil_draws import measured_soil
 
 STEP = 2  # Tables show every second slip
+#: Loads down to this share of the smallest are in the range of the errors: those on a slope.
+ON_SLOPES = 0.5
+NOT_INCLUDED = "all wheels equal, no load transfer, no side slope"  # What no band includes
 _NOTATION = (
     ("90 %", "from the 5 % to the 95 % quantile; medians before them."),
     ("tractive efficiency", "power at the drawbar over that of the drive."),
@@ -193,8 +197,7 @@ def pull_report(
     """
     case, table = as_case(case), as_table(table)
     soil = measured_soil(case, table, free, estimator, exact_model)
-    case, draws, unknown = soil.case, soil.draws, soil.unknown
-    warnings = [*soil.warnings, *excluded_effects(case)]
+    case, warnings = soil.case, [*soil.warnings, *excluded_effects(soil.case)]
     table = table.rows(table.answered)
     at = operating_points(table)
     measured_range = MeasuredRange.of(table["slip"], table["load_N"])
@@ -205,11 +208,8 @@ def pull_report(
     }
     loads = measured_loads(table["load_N"]) if loads is None else loads
     slip = slip_grid(slip_limit, measured_range)
-    before, error = prior_draws(unknown, case=case), None
-    errors = soil.errors(slip, [*loads, ON_SLOPES * min(loads)], ("drawbar_pull",))
-    if errors is not None:
-        draws, before = replace(draws, errors=errors[0]), replace(before, errors=errors[1])
-        error = errors[1].amplitude("drawbar_pull")
+    asked = [*loads, ON_SLOPES * min(loads)]
+    draws, before = soil.with_errors(slip, asked, ("drawbar_pull",))
     predictions = predictions_by_load(
         case, draws, before, loads, slip, measured_range, covariates, gravity
     )
@@ -224,7 +224,7 @@ def pull_report(
         measured_range,
         predictions,
         measured_pull,
-        (*warnings, limitations(error)),
+        (*warnings, band_content(before.errors, NOT_INCLUDED)),
     )
 
 

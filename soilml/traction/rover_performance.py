@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
@@ -13,7 +14,6 @@ from soilml.errors import InputError
 from soilml.fitting.mixtures import without_faults
 from soilml.fitting.operating_points import wheel_gears, wheel_passes
 from soilml.numerics.root_finding import rising_root
-from soilml.physics.operating_point import Operating
 from soilml.traction.draws import SoilDraws
 
 SAME_LOAD = 1e-9  # Loads (N) that agree to this share are those of one wheel, solved once
@@ -77,34 +77,16 @@ def wheel_curves(
             and np.allclose(load, other, rtol=SAME_LOAD, atol=0.0)
         ]
         if not same:
-            found = _forces(own_case, draws, load, slip, passes[name], speed, gears[name])
+            force = draws.on_grid(
+                without_faults(own_case), load, slip, gears[name],
+                pass_number=float(passes[name]), speed=speed, slip_angle=0.0,
+            )  # fmt: skip
+            found = force.drawbar_pull, force.torque, force.sinkage
             solved.append((gears[name], passes[name], load, found))
             same = [found]
         curves.append(same[0])
     pull, torque, sinkage = (np.stack(each) for each in zip(*curves, strict=True))
     return WheelCurves(pull, torque, sinkage, np.asarray(radius))
-
-
-def _forces(
-    case: Case,
-    draws: SoilDraws,
-    load: Floats,
-    slip: Floats,
-    number: int,
-    speed: float | None,
-    gear: str,
-) -> tuple[Floats, ...]:
-    case = without_faults(case)
-    draw, column = (grid.ravel() for grid in np.indices((len(load), len(slip))))
-    at = Operating(
-        slip=slip[column], load=load[draw], pass_number=float(number), speed=speed, slip_angle=0.0
-    )
-    force = draws.forces(case, draw, at, gear)
-    shape = (len(load), len(slip))
-    return tuple(
-        np.reshape(np.asarray(part), shape)
-        for part in (force.drawbar_pull, force.torque, force.sinkage)
-    )
 
 
 @dataclass(frozen=True)
@@ -216,29 +198,45 @@ def rover_performance(
     )
 
 
+@dataclass(frozen=True)
+class NeededSlip:
+    """The least of m slips at which curves reach what is needed, (...), and what holds there."""
+
+    before: NDArray[np.int64]  # index of the slip before, (..., 1)
+    index: NDArray[np.int64]
+    share: Floats  # of the way between both
+    reached: NDArray[np.bool_]
+
+    @staticmethod
+    def of(total: Floats, needed: Floats) -> NeededSlip:
+        """For totals (..., m) of one unit with what is needed, which broadcasts to (...)."""
+        enough = np.nan_to_num(total, nan=-np.inf) >= needed[..., None]
+        index = np.argmax(enough, axis=-1)[..., None]
+        before = np.maximum(index - 1, 0)
+        low, high = (np.take_along_axis(total, i, axis=-1) for i in (before, index))
+        rise = np.where(high > low, high - low, 1.0)
+        share = np.where(index > 0, (needed[..., None] - low) / rise, 1.0)[..., 0]
+        return NeededSlip(before, index, share, np.asarray(enough.any(axis=-1)))
+
+    def of_curve(self, values: Floats) -> Floats:
+        """Values (..., m), or more of such, interpolated there; NaN where it is not reached."""
+        low, high = (
+            np.take_along_axis(values, np.broadcast_to(i, (*values.shape[:-1], 1)), axis=-1)[..., 0]
+            for i in (self.before, self.index)
+        )
+        return np.asarray(np.where(self.reached, low + self.share * (high - low), np.nan))
+
+
 def _at_needed_slip(curves: WheelCurves, slip: Floats, needed: float) -> dict[str, Floats]:
     """What holds at the least slip whose pull is the needed one (N), each with n draws."""
     pull = curves.total_pull
-    enough = np.nan_to_num(pull, nan=-np.inf) >= needed
-    index = np.argmax(enough, axis=1)
-    known = enough.any(axis=1)
-    draw = np.arange(len(pull))
-    before = np.maximum(index - 1, 0)
-    low, high = pull[draw, before], pull[draw, index]
-    rise = np.where(high > low, high - low, 1.0)
-    share = np.where(index > 0, (needed - low) / rise, 1.0)
-
-    def between(values: Floats) -> Floats:
-        """Values (..., n, m) interpolated at the needed slip, (..., n)."""
-        start, end = values[..., draw, before], values[..., draw, index]
-        return np.asarray(np.where(known, start + share * (end - start), np.nan))
-
+    at = NeededSlip.of(pull, np.asarray(needed))
     return {
-        "slip": between(np.broadcast_to(slip, pull.shape)),
+        "slip": at.of_curve(np.broadcast_to(slip, pull.shape)),
         "margin": np.where(np.isfinite(pull).any(axis=1), _largest(pull) - needed, np.nan),
-        "energy": between(curves.energy(slip)),
-        "torque": between(curves.torque),
-        "sinkage": between(curves.sinkage),
+        "energy": at.of_curve(curves.energy(slip)),
+        "torque": at.of_curve(curves.torque),
+        "sinkage": at.of_curve(curves.sinkage),
     }
 
 

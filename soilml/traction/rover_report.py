@@ -19,7 +19,7 @@ from soilml.io.read_table import Rows, as_table
 from soilml.numerics.quantiles import band_columns, quantile_band
 from soilml.onboard.estimator import Estimator
 from soilml.physics.soils.gravity_law import GravityChange
-from soilml.quantities import column
+from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
 from soilml.report.column_figure import column_picture
 from soilml.report.numbers import format_quantity, format_range
@@ -33,15 +33,15 @@ from soilml.traction.gravity import (
     draws_at_gravity,
     gravity_remark,
 )
-from soilml.traction.pull_and_slope import (
-    LOAD_FACTOR,
-    SLIP_MARGIN,
+from soilml.traction.measured_range import (
     MeasuredRange,
-    excluded_effects,
+    band_content,
+    extrapolations,
     slip_grid,
 )
+from soilml.traction.pull_and_slope import excluded_effects
 from soilml.traction.rover_performance import LARGEST_SLOPE, RoverPerformance, rover_performance
-from soilml.traction.soil_draws import measured_soil, prior_draws
+from soilml.traction.soil_draws import measured_soil
 
 FEWEST = 0.5  # Share of draws that climb a slope below which nothing is said of the slip there
 SLOPES = np.deg2rad([0.0, 5.0, 10.0, 15.0, 20.0])  # Slopes that are looked at by default, rad
@@ -147,12 +147,9 @@ def rover_report(
     slip = slip_grid(slip_limit, measured)
     key = column("speed")
     speed = float(np.nanmedian(table[key])) if key in table else None
-    draws, prior = soil.draws, prior_draws(soil.unknown, case=case)
     assert case.rover is not None
     loads = np.ravel(case.rover.loads(slopes)).tolist()
-    errors = soil.errors(slip, loads, ("drawbar_pull", "torque", "sinkage"))
-    if errors is not None:
-        draws, prior = replace(draws, errors=errors[0]), replace(prior, errors=errors[1])
+    draws, prior = soil.with_errors(slip, loads, CHANNELS)
     laws = None
     if gravity is not None:
         laws = compare_laws(case, draws, gravity, partial(_answers, case, slip, speed))
@@ -162,7 +159,7 @@ def rover_report(
     warnings = (
         *soil.warnings,
         *([laws.remark()] if laws else []),
-        *_warnings(case, found, measured, draws.errors, gravity),
+        *_warnings(case, found, measured, prior.errors, gravity),
     )
     return RoverReport(len(table), measured, found, before, warnings, laws)
 
@@ -200,21 +197,8 @@ def _warnings(
     gravity: GravityChange | None,
 ) -> Iterator[Remark]:
     assert case.rover is not None
-    outside = "" if errors else ", whose error is not in the bands"
-    loads = np.stack(list(found.loads.values()))
-    if loads.max() > LOAD_FACTOR * measured.load[1] or loads.min() < measured.load[0] / LOAD_FACTOR:
-        yield Remark(
-            "extrapolated",
-            f"wheels carry {loads.min():.4g} to {loads.max():.4g} N, measured were "
-            f"{measured.load[0]:.4g} to {measured.load[1]:.4g} N: extrapolated by the model"
-            f"{outside}",
-        )
-    if found.slip_limit > measured.slip[1] + SLIP_MARGIN:
-        yield Remark(
-            "extrapolated",
-            f"no slip above {measured.slip[1]:.2g} was measured: extrapolated by the model up "
-            f"to {found.slip_limit:.2g}",
-        )
+    slip, loads = np.asarray(found.slip_limit), np.stack(list(found.loads.values()))
+    yield from extrapolations(slip, loads, measured, errors is not None)
     if gravity is not None and gravity.ratio != 1.0:
         yield gravity_remark(gravity)
     elif abs(case.rover.gravity / EARTH - 1.0) > OTHER_GRAVITY:
@@ -227,15 +211,9 @@ def _warnings(
     if np.nanmean(found.steepest_slope > tipping - 1e-3) > 0.05:
         yield Remark("tipping", f"a wheel leaves the ground at {np.rad2deg(tipping):.1f} deg")
     yield from excluded_effects(case)
-    included = "the uncertainty of the soil and the noise, not errors of the model"
-    if errors is not None:
-        names = ", ".join(dict.fromkeys(name for name, _ in errors.functions))
-        included = f"the uncertainty of the soil, the noise and errors of the model ({names})"
-    yield Remark(
-        "band-content",
-        f"bands include {included}; all wheels driven at one slip, loads of equally stiff wheels, "
-        "no side slope",
-        severity="note",
+    yield band_content(
+        errors,
+        "all wheels driven at one slip, loads of equally stiff wheels, no side slope",
     )
 
 

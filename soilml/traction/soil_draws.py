@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,8 +19,10 @@ from soilml.config.compatibility import (
 from soilml.config.explanations import one_of
 from soilml.errors import FitError, InputError
 from soilml.fitting.coordinates import Coordinate, select_free
+from soilml.fitting.covariance import Whitening
 from soilml.fitting.misfit import excess_residuals_remark
 from soilml.fitting.mixtures import with_all_effects
+from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.condensing import condensed
@@ -37,16 +38,18 @@ from soilml.identification.posterior import (
     posterior_samples,
     prior_fractions,
 )
+from soilml.inference.constants import INTERVAL_FACTOR
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.maximum_entropy import moment_matched_weights
 from soilml.numerics.prior import Prior
 from soilml.numerics.quantiles import systematic_resampling
 from soilml.onboard.estimator import Estimator
-from soilml.quantities import column
+from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
-from soilml.traction.draws import DrawnErrors, SoilDraws, draw_model_errors
-from soilml.traction.mixture_draws import posterior_draws_of
+from soilml.traction.draws import SoilDraws
+from soilml.traction.model_errors import LeftByDraws, drawn_errors, learned, stated_size
+from soilml.traction.posterior_draws import posterior_draws_of
 
 #: Where the soil of rows is drawn without a remainder that was learned from them.
 DRAWN_WITHOUT = Remark(
@@ -138,27 +141,37 @@ def estimated_draws(
     return SoilDraws(tuple(f.path for f in free), low + width * found.u[rows])
 
 
-#: Errors given the rows, and before them, by slips, loads (N) and channels asked for.
-ErrorsAt = Callable[
-    [Floats, Sequence[float], Sequence[str]], tuple[DrawnErrors, DrawnErrors] | None
-]
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeasuredSoil:
     """What predicts on the soil of measured rows.
 
     case: The case whose parameters the draws give; of several explanations, with all their effects.
     draws: Draws of these parameters.
     unknown: The parameters that were unknown.
-    errors: What draws the errors of the model beside them.
+    readings: What was measured, beyond whose range errors fade.
+    left: What the draws leave of the readings.
+    spread: Factor on the standard deviations of errors given the readings.
     """
 
     case: Case
     draws: SoilDraws
     unknown: Sequence[Coordinate]
     warnings: tuple[Remark, ...]
-    errors: ErrorsAt
+    readings: Readings
+    left: Sequence[LeftByDraws]
+    spread: float = 1.0
+
+    def with_errors(
+        self, slip: Floats, load: Sequence[float], channels: Sequence[str]
+    ) -> tuple[SoilDraws, SoilDraws]:
+        """Draws given the rows, and of the prior, with the errors of these channels.
+
+        slip, load: Slips and loads (N) at which errors are asked for.
+        """
+        found = drawn_errors(self.case, self.readings, self.left, slip, load, channels, self.spread)
+        after, before = found or (None, None)
+        prior = prior_draws(self.unknown, case=self.case)
+        return replace(self.draws, errors=after), replace(prior, errors=before)
 
 
 def estimated_soil(estimator: Estimator, case: Case, table: Table) -> MeasuredSoil:
@@ -198,9 +211,9 @@ def estimated_soil(estimator: Estimator, case: Case, table: Table) -> MeasuredSo
         )
         warnings.append(Remark("out-of-range", text))
     draws = estimated_draws(free, estimate.mean, estimate.covariance)
-    case = case.without_explanations()
-    errors = partial(_declared_errors, case, table, draws, None)
-    return MeasuredSoil(case, draws, free, tuple(warnings), errors)
+    case, whole = case.without_explanations(), usable_readings(case, table)
+    left = LeftByDraws(np.arange(DRAWS), _stated_sizes(case, whole))
+    return MeasuredSoil(case, draws, free, tuple(warnings), whole, [left])
 
 
 def _check_case(estimator: Estimator, case: Case) -> list[Remark]:
@@ -238,47 +251,47 @@ def measured_soil(
         return estimated_soil(estimator, case, table.rows(table.answered))
     if exact_model:
         return _exact_soil(case, table, free)
-    learned, case = case.remainder, case.without_learned_discrepancy()
+    learned_before, case = case.remainder, case.without_learned_discrepancy()
     case = case.without_remainder_of(table)
     unknown = select_free(case, free)
     readings = usable_readings(case, table)
     check_declared(readings)
     found = posterior_draws_of(case, readings, unknown, DRAWS)
-    warnings = [*([DRAWN_WITHOUT] if case.remainder is not learned else []), *readings.notes]
+    warnings = [*([DRAWN_WITHOUT] if case.remainder is not learned_before else []), *readings.notes]
     if readings.channels == ("torque",):
         text = "torque alone hardly reveals errors of the model: measure pull or sinkage too"
         warnings.append(Remark("torque-alone", text, ("torque_Nm",)))
     warnings += found.remarks()
-    return MeasuredSoil(found.case, found.soil, unknown, tuple(warnings), found.errors)
+    return MeasuredSoil(
+        found.case, found.soil, unknown, tuple(warnings), found.readings, found.left(),
+        INTERVAL_FACTOR,
+    )  # fmt: skip
 
 
 def _exact_soil(case: Case, table: Table, free: Sequence[str] | None) -> MeasuredSoil:
     """The soil with model and sensors exactly as the case has them."""
     case = one_of(case, "the case")
-    unknown = select_free(case, free)
-    readings = condensed(case, usable_readings(case, table), unknown)
-    check_declared(readings)
-    samples = posterior_samples(case, readings, unknown)
-    draws = _soil_draws(unknown, samples.sample.u[samples.equally_weighted(DRAWS)])
-    warnings = [*readings.notes]
+    unknown, whole = select_free(case, free), usable_readings(case, table)
+    check_declared(whole)
+    samples = posterior_samples(case, condensed(case, whole, unknown), unknown)
+    x = samples.sample.u[samples.equally_weighted(DRAWS)]
+    warnings = [*whole.notes]
     if samples.noise_inflated:
         consequence = "bands are widened and may be biased"
         warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
-    answered = table.rows(table.answered)
-    errors = partial(_declared_errors, case, answered, draws, samples.noise_scale)
-    return MeasuredSoil(case, draws, unknown, tuple(warnings), errors)
+    residual = np.nan_to_num(whole.measured - predict(case, unknown, x, whole))
+    none = np.zeros((len(whole), 0))
+    left = LeftByDraws(
+        np.arange(DRAWS), _stated_sizes(case, whole), residual,
+        Whitening(1.0 / whole.std, none, np.zeros(0)),
+    )  # fmt: skip
+    draws = _soil_draws(unknown, x)
+    return MeasuredSoil(case, draws, unknown, tuple(warnings), whole, [left], samples.noise_scale)
 
 
-def _declared_errors(
-    case: Case,
-    table: Table,
-    draws: SoilDraws,
-    noise_scale: float | None,
-    slip: Floats,
-    load: Sequence[float],
-    channels: Sequence[str],
-) -> tuple[DrawnErrors, DrawnErrors] | None:
-    """Errors that [discrepancy] or [remainder] states."""
-    return draw_model_errors(
-        case, table, draws, slip, load, channels=channels, noise_scale=noise_scale
-    )
+def _stated_sizes(case: Case, readings: Readings) -> dict[str, tuple[float, float]]:
+    """Sizes of the stated errors; those of a [remainder] are in its functions."""
+    sizes = {
+        name: 1.0 if learned(case, name) else stated_size(case, readings, name) for name in CHANNELS
+    }
+    return {name: (size, size) for name, size in sizes.items() if size > 0.0}

@@ -6,10 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from training.onnx_graph.value import Value, absolute, maximum, squared_distances
+from training.onnx_graph.value import (
+    Tensor,
+    absolute,
+    any_of_row,
+    maximum,
+    one_column,
+    squared_distances,
+)
 from training.regressors.gaussian_regressor import Standardisation
 
 #: Readings that are operating conditions: the driver sets them, the soil does not.
@@ -70,49 +76,26 @@ class ConditionalBounds:
         upper = upper + margin + SIZE_MARGIN * np.abs(upper)
         return ConditionalBounds(column, conditions[: len(knots)], knots, lower, upper)
 
-    def contains(self, features: Floats) -> NDArray[np.bool_]:
-        """Whether rows (n, d) lie within the bounds, (n,)."""
-        weights = [
-            _hat_functions(features[:, k], along)
-            for k, along in zip(self.conditions, self.knots, strict=True)
-        ]
-        lower, upper = (_interpolate(weights, bound) for bound in (self.lower, self.upper))
-        values = features[:, self.column]
-        return np.asarray((values >= lower) & (values <= upper))
-
-    def add_outside(self, features: Value) -> Value:
-        """Add to an ONNX graph whether rows (n, d) lie outside the bounds, (n,)."""
+    def outside(self, features: Tensor) -> Tensor:
+        """Whether rows (n, d) lie outside the bounds, (n,)."""
         weights = []
         for k, along in zip(self.conditions, self.knots, strict=True):
-            clipped = features.columns(k, k + 1).clip(along[0], along[-1])
+            clipped = one_column(features, k).clip(along[0], along[-1])
             distance = (clipped - along) / float(along[1] - along[0])
             weights.append(maximum(1.0 - absolute(distance), 0.0))
-        value = features.columns(self.column, self.column + 1).reshape(-1)
-        lower, upper = (_add_interpolation(weights, bound) for bound in (self.lower, self.upper))
-        return (value < lower) | (value > upper)
+        value = one_column(features, self.column).reshape(-1)
+        lower, upper = (_interpolated(weights, bound) for bound in (self.lower, self.upper))
+        outside: Tensor = (value < lower) | (value > upper)
+        return outside
 
 
-def _hat_functions(values: Floats, knots: Floats) -> Floats:
-    """Weights (n, k) of the knots in linear interpolation."""
-    clipped = np.clip(values, knots[0], knots[-1])
-    distance = (clipped[:, None] - knots) / (knots[1] - knots[0])
-    return np.asarray(np.maximum(1.0 - np.abs(distance), 0.0))
-
-
-def _interpolate(weights: list[Floats], bound: Floats) -> Floats:
+def _interpolated(weights: list[Tensor], bound: Floats) -> Tensor:
     """A bound (n,) from the hat functions (n, k) along one or two conditions."""
     along_first = weights[0] @ bound
     if len(weights) == 1:
-        return np.asarray(along_first)
-    return np.asarray((along_first * weights[1]).sum(axis=1))
-
-
-def _add_interpolation(weights: list[Value], bound: Floats) -> Value:
-    """The same as nodes of an ONNX graph."""
-    along_first = weights[0] @ bound
-    if len(weights) == 1:
         return along_first
-    return (along_first * weights[1]).sum(axis=1, keepdims=False)
+    both: Tensor = (along_first * weights[1]).sum(axis=1, keepdims=False)
+    return both
 
 
 #: Number of balls, and of the rows that their centres are selected from: more cost time and bytes.
@@ -166,7 +149,7 @@ class TrainingDomain:
             selected.append(int(np.argmax(nearest)))
         centres = candidates[selected]
         radius = max(
-            float(np.sqrt(_nearest_squared(z[i : i + CHUNK], centres).max()))
+            float(np.sqrt(squared_distances(z[i : i + CHUNK], centres).min(axis=1).max()))
             for i in range(0, len(z), CHUNK)
         )
         slack = 2.0 / (len(z) + 1.0) if few else 0.0
@@ -184,22 +167,15 @@ class TrainingDomain:
             ),
         )
 
-    def contains(self, features: Floats) -> NDArray[np.bool_]:
-        """Whether rows (n, d) lie in the training domain, (n,)."""
-        in_box = ((features >= self.lower) & (features <= self.upper)).all(axis=1)
-        covered = _nearest_squared(self.scaling.apply(features), self.centres) <= self.radius**2
-        within = [bounds.contains(features) for bounds in self.bounds]
-        return np.asarray(np.logical_and.reduce([in_box, covered, *within]))
-
-    def add_to_graph(self, features: Value) -> Value:
-        """Add the same test of features (n, d) to an ONNX graph; the flag (n,)."""
-        outside = ((features < self.lower) | (features > self.upper)).astype(np.float64)
+    def contains(self, features: Tensor) -> Tensor:
+        """Whether rows (n, d), of an array or an ONNX graph, lie in the training domain, (n,)."""
+        out = any_of_row((features < self.lower) | (features > self.upper))
         x = (features - self.scaling.mean) / self.scaling.scale
-        nearest = squared_distances(x, self.centres).reduce("ReduceMin", 1, False)
-        out = (outside.reduce("ReduceMax", 1, False) > 0.5) | (nearest > self.radius**2)
+        out = out | (squared_distances(x, self.centres).min(axis=1) > self.radius**2)
         for bounds in self.bounds:
-            out = out | bounds.add_outside(features)
-        return ~out
+            out = out | bounds.outside(features)
+        inside: Tensor = ~out
+        return inside
 
 
 def _largest_gap(z: Floats) -> float:
@@ -208,9 +184,3 @@ def _largest_gap(z: Floats) -> float:
     squared[squared == 0.0] = np.inf  # a row itself, and the same readings again
     nearest = squared.min(axis=1)
     return float(np.sqrt(nearest.max(where=np.isfinite(nearest), initial=0.0))) * 1.5
-
-
-def _nearest_squared(z: Floats, centres: Floats) -> Floats:
-    """Squared distance (n,) from rows (n, d) to the nearest centre."""
-    squared = (z**2).sum(axis=1)[:, None] + (centres**2).sum(axis=1) - 2.0 * (z @ centres.T)
-    return np.asarray(np.maximum(squared.min(axis=1), 0.0))

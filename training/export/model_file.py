@@ -96,7 +96,7 @@ def _add_single_rows(trained: TrainedModel, graph: Graph, prefix: str) -> None:
     mean, std = estimator.regressor.add_to_graph(features)
     std, q = std * estimator.std_scale, len(spec.targets)
     covariance = std.reshape(-1, q, 1) * std.reshape(-1, 1, q) * estimator.correlation
-    inside = trained.domain.add_to_graph(features) & finite
+    inside = trained.domain.contains(features) & finite
     inside.node("Identity").named(prefix + "in_range")
     clipped = minimum(maximum(mean, prior.lower), prior.upper)
     answers = {

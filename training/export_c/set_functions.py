@@ -48,6 +48,10 @@ from training.set_posterior.sampler import (
 )
 
 CHANNELS = 3  # Readings of a row
+EARLIER = (
+    "the file is of an earlier version, whose graph has no composites, or other ones; needed is "
+    "one that this version has trained"
+)
 #: Points of a tile, which are computed side by side; the latter where memory is scarce.
 TILE, SMALL_TILE = 32, 8
 FEW_ROWS = 20  # A system of so many rows is not made smaller
@@ -81,10 +85,7 @@ def set_functions(model: Any, interface: Interface, shared: SharedParts, rows: i
     nodes = flat_nodes(model.graph, known)
     found = {node.op_type: node for node in nodes if node.op_type in (SOUND, FIRST, POSTERIOR)}
     if len(found) < 3:
-        raise ModelFileError(
-            "the file is of an earlier version, whose graph has no composites; needed is one that "
-            "this version has trained"
-        )
+        raise ModelFileError(EARLIER)
     likeliest = next((node for node in nodes if node.op_type == LIKELIEST), None)
     first, posterior = (_arguments(model, found[kind]) for kind in (FIRST, POSTERIOR))
     given = {
@@ -121,6 +122,8 @@ def set_functions(model: Any, interface: Interface, shared: SharedParts, rows: i
         "row_graph", nodes, known, {**given, **own},
         [*names.values(), *sorted(live)], shared,
     )  # fmt: skip
+    if row.outputs[first["columns"]][1][0] != CHANNELS:
+        raise ModelFileError(EARLIER)
     kept = {name: Tensor(f"in_{name}", *row.outputs[name]) for name in sorted(live)}
     if wrong := [name for name, tensor in kept.items() if tensor.kind != "float"]:
         raise ModelFileError(f"value {wrong[0]} of a row is not float32")

@@ -12,7 +12,7 @@ from soilml.errors import ModelFileError
 from training.export_c.operators import OPERATORS
 from training.export_c.program import Function, Node, Program, SharedParts
 from training.export_c.tensor import Tensor
-from training.onnx_graph.builder import DOMAIN, OPSET, needed_nodes, without_branches
+from training.onnx_graph.builder import DOMAIN, OPSET, SHORTCUT, needed_nodes, without_branches
 
 #: Local functions of a file that are templates of C; others are replaced by their nodes.
 SOUND, FIRST, LIKELIEST, POSTERIOR = "SoundMemory", "FirstRound", "LikeliestSoil", "Posterior"
@@ -32,6 +32,8 @@ def with_templates(model: Any) -> Any:
 def flat_nodes(graph: Any, known: dict[str, Tensor]) -> list[Any]:
     """The nodes of a graph, with each If node replaced by the branch of its constant condition.
 
+    Of shortcuts (`Graph.either_of`) it is the branch that is right in every case.
+
     known: Values by name, to which the constants of the graph and of its branches are added.
 
     Raises `ModelFileError` for a condition that depends on the readings.
@@ -39,6 +41,8 @@ def flat_nodes(graph: Any, known: dict[str, Tensor]) -> list[Any]:
     from onnx import numpy_helper
 
     def chosen(node: Any) -> str:
+        if SHORTCUT in node.output[0]:
+            return "then_branch"
         condition = known.get(node.input[0])
         if condition is None or condition.value is None:
             raise ModelFileError(

@@ -31,6 +31,9 @@ DOMAIN = "soilml"  # Of the local functions
 
 OPSET = 18
 IR_VERSION = 9
+#: Begins the names of the results of an If node whose first branch is right in every case: the
+#: other one saves time where the case is simple.
+SHORTCUT = "shortcut"
 
 
 class Graph:
@@ -42,7 +45,7 @@ class Graph:
     """
 
     def __init__(self, prefix: str = "", functions: dict[str, Any] | None = None) -> None:
-        self._prefix = prefix
+        self._prefix = self._own = prefix  # of constants, and of nodes
         self._nodes: list[Any] = []
         self._constants: list[Any] = []
         self._names_of_constants: dict[tuple[Any, ...], str] = {}
@@ -63,7 +66,7 @@ class Graph:
         """
         from onnx import compose
 
-        prefix = f"{self._prefix}m{len(self._nodes)}_"
+        prefix = f"{self._own}m{len(self._nodes)}_"
         graph = compose.add_prefix(model, prefix).graph
         self.op("Identity", given, out=graph.input[0].name)
         self._nodes.extend(graph.node)
@@ -111,9 +114,9 @@ class Graph:
         if unnamed and key in self._names_of_nodes:
             return self._names_of_nodes[key]
         count_before = len(self._nodes)
-        name = out or f"{self._prefix}v{count_before}"
+        name = out or f"{self._own}v{count_before}"
         names = outs or [name, *[f"{name}_{i}" for i in range(1, count)]]
-        own = f"{self._prefix}n{count_before}"
+        own = f"{self._own}n{count_before}"
         self._nodes.append(helper.make_node(kind, list(inputs), names, name=own, **attributes))
         if unnamed:
             self._names_of_nodes[key] = names
@@ -155,6 +158,28 @@ class Graph:
         ):
             raise ValueError(f"there is another function {name}")
         return self.ops(name, len(outputs), *inputs.values(), domain=DOMAIN)
+
+    def either_of(self, condition: str, bodies: Sequence[Callable[[], Sequence[str]]]) -> list[str]:
+        """Add an If node for results of the first body if a condition is true, else of the second.
+
+        Bodies add nodes to this graph, which lie in a branch of the If node, and return the names
+        of as many results. The first one must be right whatever the condition is. Constants lie in
+        the graph itself.
+        """
+        from onnx import helper
+
+        place, branches, names = f"{self._own}{SHORTCUT}{len(self._nodes)}", [], list[str]()
+        kept = self._own, self._nodes, self._names_of_nodes
+        for number, body in enumerate(bodies):
+            self._own, self._nodes, self._names_of_nodes = f"{place}_{number}_", [], dict(kept[2])
+            made = enumerate(body())
+            names = [self.op("Identity", one, out=f"{self._own}out{k}") for k, one in made]
+            infos = [helper.make_tensor_value_info(name, FLOAT, None) for name in names]
+            branches.append(helper.make_graph(self.needed(names)[0], self._own, [], infos))
+            self._own, self._nodes, self._names_of_nodes = kept
+        outs = [f"{place}_{k}" for k in range(len(names))]
+        then, other = branches
+        return self.ops("If", len(outs), condition, then_branch=then, else_branch=other, outs=outs)
 
     def rename_last(self, name: str, new: str) -> None:
         """Rename an output of the node that was added last, which nothing reads yet.

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -165,6 +165,10 @@ class Value:
         """The sum of squares over one axis or all; see `reduce`."""
         return self.reduce("ReduceSumSquare", axis, keepdims)
 
+    def min(self, axis: int) -> Value:
+        """The least along one axis, which is left out."""
+        return self.reduce("ReduceMin", axis, False)
+
     def reduce(self, kind: str, axis: int | None = None, keepdims: bool | None = None) -> Value:
         """A reduction over one axis or all.
 
@@ -203,21 +207,29 @@ def constant(graph: Graph, value: Any, dtype: type = np.float32, name: str = "")
     return Value(graph, graph.constant(array, exact=True, name=name), dtype)
 
 
-def _function(kind: str) -> Callable[[Value], Value]:
+#: A value of a graph, or an array: functions of these serve both, and a formula is written once.
+Tensor = TypeVar("Tensor", Value, NDArray[Any])
+
+
+class _Elementwise(Protocol):
+    def __call__(self, x: Tensor, /) -> Tensor: ...
+
+
+def _function(kind: str, of_array: Callable[[Any], Any]) -> _Elementwise:
     """A function of each element, as one node."""
-    return lambda x: x.node(kind)
+    return cast(_Elementwise, lambda x: x.node(kind) if isinstance(x, Value) else of_array(x))
 
 
-#: Functions of one value, element by element, named as in numpy.
-exp, log, sqrt = _function("Exp"), _function("Log"), _function("Sqrt")
-tanh, asinh, absolute = _function("Tanh"), _function("Asinh"), _function("Abs")
-floor = _function("Floor")
+#: Functions of one tensor, element by element, named as in numpy.
+exp, log, sqrt = _function("Exp", np.exp), _function("Log", np.log), _function("Sqrt", np.sqrt)
+tanh, asinh = _function("Tanh", np.tanh), _function("Asinh", np.arcsinh)
+absolute, floor = _function("Abs", np.abs), _function("Floor", np.floor)
 
 
-def squared_distances(x: Value, centres: NDArray[Any]) -> Value:
+def squared_distances(x: Tensor, centres: NDArray[Any]) -> Tensor:
     """Squared distances (n, m) from rows (n, d) to centres (m, d), never below zero."""
-    total = x @ (-2.0 * centres.T) + (x * x).sum(axis=1, keepdims=True)
-    return maximum(total + (centres**2).sum(axis=1), 0.0)
+    total: Any = x @ (-2.0 * centres.T) + (x * x).sum(axis=1, keepdims=True)
+    return cast(Tensor, maximum(total + (centres**2).sum(axis=1), 0.0))
 
 
 def softmax(x: Value, axis: int) -> Value:
@@ -225,14 +237,14 @@ def softmax(x: Value, axis: int) -> Value:
     return x.node("Softmax", axis=axis)
 
 
-def maximum(x: Value, other: Operand) -> Value:
-    """The larger of two values, element by element."""
-    return x.node("Max", other)
+def maximum(x: Tensor, other: Any) -> Tensor:
+    """The larger of two tensors, element by element."""
+    return x.node("Max", other) if isinstance(x, Value) else np.asarray(np.maximum(x, other))
 
 
-def minimum(x: Value, other: Operand) -> Value:
-    """The smaller of two values, element by element."""
-    return x.node("Min", other)
+def minimum(x: Tensor, other: Any) -> Tensor:
+    """The smaller of two tensors, element by element."""
+    return x.node("Min", other) if isinstance(x, Value) else np.asarray(np.minimum(x, other))
 
 
 def where(condition: Value, x: Value, otherwise: Operand) -> Value:
@@ -241,9 +253,11 @@ def where(condition: Value, x: Value, otherwise: Operand) -> Value:
     return Value(x.graph, x.graph.op("Where", *inputs), x.dtype)
 
 
-def concat(values: Sequence[Value], axis: int) -> Value:
-    """Values one after another along an axis."""
+def concat(values: Sequence[Tensor], axis: int) -> Tensor:
+    """Tensors one after another along an axis."""
     first = values[0]
+    if not isinstance(first, Value):
+        return np.concatenate(values, axis=axis)
     name = first.graph.op("Concat", *[value.name for value in values], axis=axis)
     return Value(first.graph, name, first.dtype)
 
@@ -263,6 +277,40 @@ def composite(
 
     names = {key: value.name for key, value in given.items()}
     return [Value(graph, one) for one in graph.composite(name, names, outputs, add_to)]
+
+
+def either_of(
+    condition: Value, first: Callable[[], Sequence[Value]], other: Callable[[], Sequence[Value]]
+) -> list[Value]:
+    """Results of the first body where the condition (1,) is true, else of the other, in less time.
+
+    See `Graph.either_of`.
+    """
+    graph = condition.graph
+    bodies = [lambda body=body: [value.name for value in body()] for body in (first, other)]
+    return [Value(graph, one) for one in graph.either_of(condition.name, bodies)]
+
+
+def affine(x: Tensor, weights: NDArray[Any], bias: NDArray[Any]) -> Tensor:
+    """`x weights + bias`."""
+    return gemm(x, weights, bias) if isinstance(x, Value) else np.asarray(x @ weights + bias)
+
+
+def one_column(x: Tensor, k: int) -> Tensor:
+    """Column k of a matrix, (n, 1)."""
+    return x.columns(k, k + 1) if isinstance(x, Value) else x[:, k : k + 1]
+
+
+def any_of_row(x: Tensor) -> Tensor:
+    """Whether anything in a row of a matrix of truth values is true, (n,)."""
+    if not isinstance(x, Value):
+        return np.asarray(x.any(axis=1))
+    return x.astype(np.float64).reduce("ReduceMax", 1, False) > 0.5
+
+
+def halves(x: Tensor) -> list[Tensor]:
+    """Both halves of the columns of a matrix."""
+    return x.split(2, axis=1) if isinstance(x, Value) else np.split(x, 2, axis=1)
 
 
 def gemm(

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from soilml.arrays import Floats
-from training.onnx_graph.value import Value, gemm, tanh
+from training.onnx_graph.value import Tensor, halves
 from training.regressors.gaussian_regressor import GaussianRegressor, Groups, Progress
-from training.regressors.tanh_network import TanhNetwork, evaluate_layers, layer_pairs
+from training.regressors.tanh_network import TanhNetwork, evaluate_layers
 
 Singles = NDArray[np.float32]
 
@@ -91,16 +91,8 @@ class GaussianMLP(GaussianRegressor):
             progress(step + 1, steps)
         self.layers_ = network.layers()
 
-    def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
-        both = evaluate_layers(self.layers_, x)
-        q = both.shape[1] // 2
-        return both[:, :q], both[:, q:]
-
-    def _add_standardised_outputs(self, x: Value) -> tuple[Value, Value]:
-        *inner, (weights, bias) = layer_pairs(self.layers_)
-        for inner_weights, inner_bias in inner:
-            x = tanh(gemm(x, inner_weights, inner_bias))
-        mean, log_variance = gemm(x, weights, bias).split(2, axis=1)
+    def _standardised_outputs(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        mean, log_variance = halves(evaluate_layers(self.layers_, x))
         return mean, log_variance
 
     def fitted_settings(self) -> str:

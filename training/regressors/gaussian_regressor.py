@@ -13,7 +13,7 @@ from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from soilml.arrays import Floats
-from training.onnx_graph.value import Value, exp, maximum, minimum
+from training.onnx_graph.value import Tensor, Value, exp, maximum, minimum
 
 Groups = NDArray[np.int64]
 #: Called with the steps done and the total number of steps.
@@ -91,16 +91,8 @@ class GaussianHead:
         low, high = np.quantile(log_variance, [TAIL, 1.0 - TAIL], axis=0)
         return GaussianHead(scaling, low, high, one_output)
 
-    def to_original_units(self, mean: Floats, log_variance: Floats, return_std: bool) -> Any:
-        """Mean, or mean and standard deviation, (n,) or (n, q) as y was."""
-        mean = self.scaling.undo(mean)
-        std = np.exp(0.5 * np.clip(log_variance, self.low, self.high)) * self.scaling.scale
-        if self.one_output:
-            mean, std = mean[:, 0], std[:, 0]
-        return (mean, std) if return_std else mean
-
-    def add_to_graph(self, mean: Value, log_variance: Value) -> tuple[Value, Value]:
-        """Add the same conversion to an ONNX graph; mean and std, (n, q)."""
+    def in_original_units(self, mean: Tensor, log_variance: Tensor) -> tuple[Tensor, Tensor]:
+        """Mean and standard deviation (n, q)."""
         clipped = minimum(maximum(log_variance, self.low), self.high)
         std = exp(clipped * 0.5) * self.scaling.scale
         return mean * self.scaling.scale + self.scaling.mean, std
@@ -110,7 +102,7 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
     """Base of the regressors: mean and log-variance of standardised outputs.
 
     A subclass has a `type_name` for the spec, hyperparameters as keyword arguments of `__init__`,
-    and the three abstract methods, which know standardised inputs (n, d) and outputs (n, q) alone.
+    and the two abstract methods, which know standardised inputs (n, d) and outputs (n, q) alone.
 
     Attributes
     ----------
@@ -121,6 +113,7 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
     """
 
     type_name: ClassVar[str]
+    rows_at_a_time: float = 4096  # That are predicted
 
     x_scaling_: Standardisation
     y_scaling_: Standardisation
@@ -131,16 +124,30 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
         """Fit inputs x to outputs z; rows of one group (n,) share a part of their error."""
 
     @abstractmethod
-    def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
-        """Mean and log-variance (n, q)."""
+    def _standardised_outputs(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        """Mean and log-variance (n, q) of inputs times `_input_factor`.
 
-    @abstractmethod
+        One formula for arrays, and for values of an ONNX graph in double precision: functions of
+        `training.onnx_graph.value` take both.
+        """
+
     def _add_standardised_outputs(self, x: Value) -> tuple[Value, Value]:
-        """Add the same to an ONNX graph, in double precision."""
+        """The same in an ONNX graph, where it needs another way."""
+        return self._standardised_outputs(x)
 
     def _input_factor(self) -> float:
-        """Factor on standardised inputs in the graph."""
+        """Factor on standardised inputs."""
         return 1.0
+
+    def _outputs(self, x: Floats) -> tuple[Floats, Floats]:
+        """Mean and log-variance (n, q) of standardised rows, computed in parts."""
+        at_a_time = max(int(self.rows_at_a_time), 1)
+        parts = [
+            self._standardised_outputs(x[first : first + at_a_time] * self._input_factor())
+            for first in range(0, len(x), at_a_time)
+        ]
+        mean, log_variance = (np.concatenate(part) for part in zip(*parts, strict=True))
+        return mean, log_variance
 
     def _left_out(
         self, x: Floats, z: Floats, groups: Groups, progress: Progress
@@ -151,7 +158,7 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
             progress(k, count)
             out, other = fold == k, clone(self)
             other._fit_standardised(x[~out], z[~out], groups[~out], lambda done, total: None)
-            mean[out], log_variance[out] = other._standardised_outputs(x[out])
+            mean[out], log_variance[out] = other._outputs(x[out])
         progress(count, count)
         return mean, log_variance
 
@@ -175,8 +182,7 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
         if equal_std:
             log_variance = np.zeros_like(z)
         self.head_ = GaussianHead.of(self.y_scaling_, log_variance, y.ndim == 1)
-        found: tuple[Floats, Floats] = self.head_.to_original_units(mean, log_variance, True)
-        return found
+        return self.head_.in_original_units(mean, log_variance)
 
     def _fit(
         self, X: Any, y: Any, groups: Groups | None, progress: Progress
@@ -189,14 +195,14 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
         x, z = self.x_scaling_.apply(X), self.y_scaling_.apply(Y)
         self._fit_standardised(x, z, np.arange(len(x)) if groups is None else groups, progress)
         some = np.random.default_rng(1).permutation(len(x))[:RANGE_ROWS]
-        log_variance = self._standardised_outputs(x[some])[1]
+        log_variance = self._outputs(x[some])[1]
         self.head_ = GaussianHead.of(self.y_scaling_, log_variance, y.ndim == 1)
         return x, z
 
     def add_to_graph(self, features: Value) -> tuple[Value, Value]:
         """Add the fitted regressor to an ONNX graph; mean and std, (n, q), of features (n, d)."""
         x = (features - self.x_scaling_.mean) / (self.x_scaling_.scale / self._input_factor())
-        return self.head_.add_to_graph(*self._add_standardised_outputs(x))
+        return self.head_.in_original_units(*self._add_standardised_outputs(x))
 
     def predict(self, X: Any, return_std: bool = False) -> Any:
         """Predict rows X (n, d).
@@ -206,8 +212,9 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
-        outputs = self._standardised_outputs(self.x_scaling_.apply(X))
-        return self.head_.to_original_units(*outputs, return_std)
+        found = self.head_.in_original_units(*self._outputs(self.x_scaling_.apply(X)))
+        mean, std = (part[:, 0] if self.head_.one_output else part for part in found)
+        return (mean, std) if return_std else mean
 
     def fitted_settings(self) -> str:
         """Size and chosen hyperparameters of the fitted regressor, for the model card."""

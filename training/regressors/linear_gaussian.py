@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from soilml.arrays import Floats
-from training.onnx_graph.value import Value, gemm
+from training.onnx_graph.value import Tensor, affine
 from training.regressors.gaussian_regressor import (
     GaussianRegressor,
     Groups,
@@ -51,9 +51,9 @@ class LinearGaussian(GaussianRegressor):
         self.log_variance_weights_, self.log_variance_bias_ = found
         return self
 
-    def log_variance(self, x: Floats) -> Floats:
+    def log_variance(self, x: Tensor) -> Tensor:
         """Log-variance (n, q) of standardised rows."""
-        return np.asarray(x @ self.log_variance_weights_ + self.log_variance_bias_)
+        return affine(x, self.log_variance_weights_, self.log_variance_bias_)
 
     def _ridge(self, x: Floats, z: Floats) -> tuple[Floats, Floats]:
         """Weights (d, q) and bias (q,) of a ridge regression."""
@@ -63,9 +63,5 @@ class LinearGaussian(GaussianRegressor):
         weights = np.linalg.solve(normal, (x - centre).T @ z)
         return weights, bias - centre @ weights
 
-    def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
-        return x @ self.weights_ + self.bias_, self.log_variance(x)
-
-    def _add_standardised_outputs(self, x: Value) -> tuple[Value, Value]:
-        mean = gemm(x, self.weights_, self.bias_)
-        return mean, gemm(x, self.log_variance_weights_, self.log_variance_bias_)
+    def _standardised_outputs(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        return affine(x, self.weights_, self.bias_), self.log_variance(x)

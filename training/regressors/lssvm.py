@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from soilml.arrays import Floats
-from training.onnx_graph.value import Value, exp, gemm, squared_distances
+from training.onnx_graph.value import Tensor, affine, exp, halves, squared_distances
 from training.regressors.gaussian_regressor import (
     GaussianRegressor,
     Groups,
@@ -19,7 +19,6 @@ from training.regressors.nystrom_features import (
     FoldedRidge,
     NystromFeatures,
     median_distance,
-    rbf,
     select_by_renyi_entropy,
 )
 
@@ -124,22 +123,18 @@ class LSSVM(GaussianRegressor):
         """In closed form, as part of the fit."""
         return self._by_others
 
-    def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
-        chunk = max(PREDICTED_AT_A_TIME // len(self.centres_), 1)
-        parts = [
-            rbf(x[i : i + chunk], self.centres_, self.width_) @ self.weights_
-            for i in range(0, len(x), chunk)
-        ]
-        mean, log_variance = np.split(np.vstack(parts) + self.bias_, 2, axis=1)
-        return mean, log_variance
+    @property
+    def rows_at_a_time(self) -> float:  # type: ignore[override]
+        """Rows whose kernel matrix is computed at a time."""
+        return PREDICTED_AT_A_TIME / len(self.centres_)
 
     def _input_factor(self) -> float:
         """With x and centres divided by sqrt(2) width the kernel is exp(-|x - c|^2)."""
         return float(1.0 / (np.sqrt(2.0) * self.width_))
 
-    def _add_standardised_outputs(self, x: Value) -> tuple[Value, Value]:
+    def _standardised_outputs(self, x: Tensor) -> tuple[Tensor, Tensor]:
         kernel = exp(-squared_distances(x, self.centres_ * self._input_factor()))
-        mean, log_variance = gemm(kernel, self.weights_, self.bias_).split(2, axis=1)
+        mean, log_variance = halves(affine(kernel, self.weights_, self.bias_))
         return mean, log_variance
 
     def fitted_settings(self) -> str:

@@ -13,7 +13,7 @@ from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.optional_imports import need
 from training.onnx_graph.builder import OPSET, session_of
-from training.onnx_graph.value import Value, gemm
+from training.onnx_graph.value import Value
 from training.regressors.gaussian_regressor import GaussianRegressor, Groups, Progress, folds_of
 from training.regressors.linear_gaussian import LinearGaussian
 
@@ -71,7 +71,7 @@ class ScikitLearn(GaussianRegressor):
         self.variance_ = LinearGaussian().fit_log_variance(x, residual)
         progress(count + 1, count + 1)
 
-    def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
+    def _standardised_outputs(self, x: Any) -> tuple[Any, Any]:
         return _mean(self.mean_, x), self.variance_.log_variance(x)
 
     def _add_standardised_outputs(self, x: Value) -> tuple[Value, Value]:
@@ -97,8 +97,8 @@ class ScikitLearn(GaussianRegressor):
                 "deviations of the outputs; take another regressor, such as an ensemble of trees"
             )
         output = Value(x.graph, x.graph.inline(model, x.astype(np.float32).name))
-        mean, variance = output.astype(np.float64).reshape(-1, found.shape[-1]), self.variance_
-        return mean, gemm(x, variance.log_variance_weights_, variance.log_variance_bias_)
+        mean = output.astype(np.float64).reshape(-1, found.shape[-1])
+        return mean, self.variance_.log_variance(x)
 
     def _blank(self) -> Any:
         """The regressor, not fitted."""

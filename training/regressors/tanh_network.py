@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
+from training.onnx_graph.value import Tensor, affine, tanh
 
 Singles = NDArray[np.float32]
 
@@ -104,17 +105,12 @@ class TanhNetwork:
         self._flat -= scratch
 
 
-def layer_pairs(layers: Sequence[Floats]) -> list[tuple[Floats, Floats]]:
-    """Weights and bias of each layer, of `TanhNetwork.layers`."""
-    return list(zip(layers[0::2], layers[1::2], strict=True))
-
-
-def evaluate_layers(layers: Sequence[Floats], x: Floats) -> Floats:
+def evaluate_layers(layers: Sequence[Floats], x: Tensor) -> Tensor:
     """Outputs (n, q) of inputs (n, d) in double precision, by `TanhNetwork.layers`."""
-    *inner, (last_weights, last_bias) = layer_pairs(layers)
-    for weights, bias in inner:
-        x = np.tanh(x @ weights + bias)
-    return np.asarray(x @ last_weights + last_bias)
+    *inner, last = zip(layers[0::2], layers[1::2], strict=True)
+    for layer in inner:
+        x = tanh(affine(x, *layer))
+    return affine(x, *last)
 
 
 def _views(flat: Singles, shapes: Sequence[tuple[int, ...]]) -> list[tuple[Singles, Singles]]:

@@ -23,7 +23,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, SENSOR_ERROR_COLUMNS
-from training.onnx_graph.value import Value, composite, concat, constant, gemm
+from training.onnx_graph.value import Value, composite, concat, constant, either_of, gemm
 from training.set_posterior.draws import ProposalDraws, SampleSizes
 from training.set_posterior.error_scales import ErrorScales
 from training.set_posterior.monomials import ONE, Terms, derivative
@@ -129,11 +129,11 @@ def _joined(state: Value, columns: Value, used: Value, errors: list[int]) -> lis
     """Columns of monomials, and of kinds of errors, of earlier and of new readings, each (m, k).
 
     state: System (kept, terms + errors) of earlier readings.
-    columns: Of new readings as rows (terms + errors, readings).
+    columns: Of new readings, (readings, terms + errors).
     used: Whether each of them takes part.
     errors: Numbers of columns of each kind, which may be fewer than those of the state.
     """
-    new = columns.node("Transpose").node("Compress", used, axis=0)
+    new = columns.node("Compress", used, axis=0)
     if lacking := OF_SENSORS + OF_MODEL - sum(errors):
         state, _ = state.last_columns(lacking)
     return concat([state, new], axis=0).last_columns(*errors)
@@ -195,8 +195,8 @@ class Likelihood:
     ) -> list[Value]:  # fmt: skip
         """From readings to the first round, with errors linear in the middle of the prior."""
         whole, sensors = _joined(state, columns, used, [OF_SENSORS])
-        whole, taken = self._in_unknowns(whole, sensors, unknowns)
-        system = integrate_out(concat([whole, taken], axis=1), self._taken)
+        system = self._without_sensors([], whole, sensors, unknowns)
+        system = system.node("Squeeze", system.indices([0]))
         return first_round(self.polynomials, system, draws, t, log_prior)
 
     def _posterior_body(
@@ -208,9 +208,8 @@ class Likelihood:
         whole, sensors, model = _joined(state, columns, used, [OF_SENSORS, OF_MODEL])
         grown = concat([whole, sensors, model], axis=1)
         present = np.flatnonzero(self.present).tolist()
-        whole, taken = self._in_unknowns(whole, sensors, unknowns)
         model = model.take(present, axis=1)
-        system = integrate_out(concat([whole, model, taken], axis=1), self._taken)
+        system = self._without_sensors([model], whole, sensors, unknowns)
         system, model = system.last_columns(len(present))
         mixture = scale_mixture(system, model, size, self.scales, self.present)
         first, draws = (prior, solved, free, outside), ProposalDraws(normal, t, log_density)
@@ -218,17 +217,23 @@ class Likelihood:
         found = adapted_rounds(self.polynomials, mixture, limit, targets, sizes, first, draws)
         return [*found, grown]
 
-    @property
-    def _taken(self) -> int:
-        """Number of columns that are integrated out as errors of sensors are."""
-        return OF_SENSORS + (len(self.nearly_known.axes) if self.nearly_known else 0)
+    def _without_sensors(
+        self, others: list[Value], whole: Value, sensors: Value, unknowns: Value | None
+    ) -> Value:
+        """Columns (1, m, k) of the sampled monomials and others, without errors of the sensors.
 
-    def _in_unknowns(
-        self, whole: Value, sensors: Value, unknowns: Value | None
-    ) -> tuple[Value, Value]:
-        """Columns of the sampled monomials, and those that are integrated out."""
+        The nearly known unknowns are integrated out as these are.
+        """
+        of_z, linear = list[Value](), 0
         if self.nearly_known is not None and unknowns is not None:
-            both = whole @ unknowns
-            whole, of_z = both.last_columns(len(self.nearly_known.axes))
-            sensors = concat([of_z, sensors], axis=1)
-        return whole, sensors
+            linear = len(self.nearly_known.axes)
+            whole, *of_z = (whole @ unknowns).last_columns(linear)
+        system = concat([whole, *others, *of_z, sensors], axis=1)
+        systems = system.node("Unsqueeze", system.indices([0]))
+        some = sensors.sum_of_squares(keepdims=False) > 0.0
+        (systems,) = either_of(
+            some,
+            lambda: [integrate_out(systems, OF_SENSORS)[0]],
+            lambda: systems.last_columns(OF_SENSORS)[:1],
+        )
+        return integrate_out(systems, linear)[0]

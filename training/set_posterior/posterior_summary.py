@@ -215,7 +215,8 @@ def _add_edge_flag(family: WheelFamily, mean: Value, std: Value) -> Value:
     """Whether a mean is within `EDGE_STDS` standard deviations of an end of its prior, (q,)."""
     ends = np.asarray([axis.ends for axis in family.axes[: family.targets]])
     middle, half = ends.mean(axis=1), 0.5 * np.diff(ends, axis=1)[:, 0]
-    return absolute(mean - middle) + std * EDGE_STDS > half
+    near: Value = absolute(mean - middle) + std * EDGE_STDS > half
+    return near
 
 
 def prior_summary(family: WheelFamily) -> dict[str, Floats]:

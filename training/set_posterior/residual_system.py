@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from soilml.onboard.set_contract import (
+    ERROR_COLUMNS,
     LAW_ERROR_COLUMNS,
     MODEL_ERROR_COLUMNS,
     MODEL_ERROR_INPUT,
     OPERATING_NOISE,
     OPERATING_STD_INPUTS,
     RESPONSE_CHANNELS,
+    SENSOR_ERROR_COLUMNS,
 )
+from soilml.quantities import SHEAR
 from training.onnx_graph.value import (
     Value,
     absolute,
     concat,
     constant,
+    either_of,
     exp,
     gemm,
     log,
@@ -27,17 +30,19 @@ from training.onnx_graph.value import (
     sqrt,
 )
 from training.set_posterior.error_scales import OF_CHANNELS
-from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
     ContextValues,
     WheelFamily,
 )
-from training.set_posterior.monomials import ONE, Terms, derivative
+from training.set_posterior.monomials import ONE, derivative
 from training.set_posterior.response_surface import Response, ResponseValues
+from training.set_posterior.scale_mixture import integrate_out
 
 CHANNELS = len(RESPONSE_CHANNELS)
+#: Columns of errors of the system: those of sensors alone, and those of the model too.
+OF_ERRORS = (len(SENSOR_ERROR_COLUMNS), len(ERROR_COLUMNS))
 #: Tolerance of the box of features, as a share of its width: float32 rounds readings at its ends.
 BOX_TOLERANCE = 1e-3
 #: Rows that are out of range by up to so many standard deviations of slip or load are left out, but
@@ -47,7 +52,8 @@ NOISE_MARGIN = 3.0
 #: more.
 MOST_PULL_NOISE = 1e3
 FRICTION = "friction_angle"
-STRENGTH, MODULUS = ("cohesion", FRICTION), ("shear_modulus",)  # Unknowns of the shear strength
+#: Unknowns that the strength, the shear modulus and the cohesion consist of.
+LAW_UNKNOWNS = (("cohesion", FRICTION), ("shear_modulus",), ("cohesion",))
 GROWS = "_by_slip"  # End of the names of errors that grow with slip
 
 
@@ -60,7 +66,8 @@ class ResidualRows:
     one standard deviation of each error that all rows share, in the order of `ERROR_COLUMNS`.
 
     Until the system is complete its columns are kept as rows (columns, readings), where a reading
-    is one channel of one row: so they are joined without a copy of each.
+    is one channel of one row: so they are joined without a copy of each. Readings of the complete
+    system are ordered by row.
     """
 
     family: WheelFamily
@@ -78,7 +85,7 @@ class ResidualRows:
     counts: Value  # (3,) float32: readings in the system, rows, rows in range within their noise
 
     def columns_at(self, basis: Value | None) -> Value:
-        r"""Columns (terms + errors, readings), with errors linear at one soil.
+        r"""The system (readings, terms + errors) of new rows, with errors linear at one soil.
 
         Errors of a row's slip and load are part of all its channels. With d the changes of its
         weighted residuals with one standard deviation of such an error, their covariance is
@@ -92,10 +99,19 @@ class ResidualRows:
         of_residuals = self._slopes_of_residuals(slopes)
         parts = [self.values.coefficients, self._sensor_columns(of_residuals)]
         if basis is not None:
-            parts.append(self._model_columns(slopes, basis))
-        system = concat(parts, axis=0) * self.weight
+            size = self.readings[MODEL_ERROR_INPUT]
+            parts += either_of(
+                size * size > 0.0,
+                lambda: [self._model_columns(slopes, basis)],
+                lambda: [self.weight * np.zeros((len(MODEL_ERROR_COLUMNS), 1))],
+            )
         noise = self.operating_noise.reshape(2, 1, -1)
-        return whiten_rows(system, (of_residuals * noise).reshape(2, -1) * self.weight)
+        of_row = (of_residuals * noise).reshape(2, -1)
+        system = concat([*parts, of_row], axis=0) * self.weight
+        by_row = system.reshape(0, CHANNELS, -1).node("Transpose", perm=[2, 1, 0])
+        whitened, _ = integrate_out(by_row, len(OPERATING_NOISE))
+        columns = len(self.response.terms) + OF_ERRORS[basis is not None]
+        return whitened.reshape(-1, columns)
 
     def _slopes_of_residuals(self, slopes: Value) -> Value:
         r"""Derivatives (2, channels, rows) of residuals by log slip and log load.
@@ -141,8 +157,7 @@ class ResidualRows:
             - \frac{\partial f}{\partial \ln W} - \frac{\partial f}{\partial \ln c}
 
         A scale of torque without load changes with the logarithm of torque itself in addition.
-        The strength is cohesion and the tangent of the friction angle. They are of usual size,
-        and zero where the model is right.
+        The strength is cohesion and the tangent of the friction angle. Errors are of usual size.
 
         slopes: Derivatives of the channels by log slip and log load, at the same soil, (2,
             channels, rows).
@@ -161,8 +176,8 @@ class ResidualRows:
         first[0] = 1.0
         of_torque = first * (1.0 - self.context.torque_by_load)
         change = slope * torque * of_torque - slopes.take([1], axis=0)  # (1, channels, rows)
-        of_strength, of_modulus = (self._by_logarithms(n, basis) for n in (STRENGTH, MODULUS))
-        change = change - self._by_logarithms(STRENGTH[:1], basis)
+        of_strength, of_modulus, of_cohesion = self._by_logarithms(basis).split(3, axis=0)
+        change = change - of_cohesion
         contact = change * 0.0
         if self.response.contact is not None:
             at_soil = self.response.contact.add_at_soil(self.context.features, basis)
@@ -180,22 +195,36 @@ class ResidualRows:
             of_modulus * stds["shear_modulus"],
         ]
         columns = concat([change * profile, contact, own, *laws], axis=0)
-        size = self.readings[MODEL_ERROR_INPUT]
-        some = (size * size > 0.0).astype(np.float32)
-        return columns.reshape(len(MODEL_ERROR_COLUMNS), -1) * some
+        return columns.reshape(len(MODEL_ERROR_COLUMNS), -1)
 
-    def _by_logarithms(self, names: Sequence[str], basis: Value) -> Value:
-        """Sum (1, channels, rows) of the changes with the logarithms of these unknowns.
+    def _by_logarithms(self, basis: Value) -> Value:
+        r"""Changes (3, channels, rows) with the logarithms of strength, modulus and cohesion.
 
-        Nil where the family has none of them.
+        .. math:: \frac{\partial b}{\partial \ln \theta} = D b \, \frac{\theta}{d\theta / dx}
+
+        Of a friction angle it is the logarithm of its tangent, with sin(theta) cos(theta) for
+        theta. They are nil where the family has none of these unknowns.
+
+        basis: Monomials (terms, 1) of the soil.
         """
-        by_log = basis * 0.0
-        axes = {axis.name: number for number, axis in enumerate(self.family.axes)}
-        for number in (axes[name] for name in names if name in axes):
-            axis = self.family.axes[number]
-            by_log = by_log + _by_log_value(basis, self.response.terms, number + 1, axis)
-        change = gemm(by_log, self.values.coefficients, transpose_a=True)
-        return change.reshape(1, CHANNELS, -1)
+        terms, linear = self.response.terms, (ONE,) * (len(self.response.terms[0]) - 1)
+        axes = [(k, axis) for k, axis in enumerate(self.family.axes, 1) if axis.name in SHEAR]
+        shift, factor, rate, slope = (
+            np.asarray([[getattr(axis, name)] for _, axis in axes])
+            for name in ("shift", "factor", "rate", "slope")
+        )
+        x = basis.take([terms.index((*linear, k)) for k, _ in axes], axis=0)
+        growth = exp(x * rate) * factor
+        value, by_x = growth + x * slope + shift, growth * rate + slope
+        angle = np.asarray([[float(axis.name == FRICTION)] for _, axis in axes])
+        value = value * (1.0 - angle) + (value * 2.0).node("Sin") * (0.5 * angle)
+        matrices = np.stack([derivative(terms, k) for k, _ in axes])
+        places = np.abs(matrices).argmax(axis=2)
+        factors = np.take_along_axis(matrices, places[..., None], 2)[..., 0]
+        by_axis = basis.node("Gather", basis.indices(places), axis=0).reshape(len(axes), -1)
+        kinds = np.asarray([[float(a.name in kind) for _, a in axes] for kind in LAW_UNKNOWNS])
+        by_log = kinds @ (by_axis * factors * (value / by_x))
+        return gemm(by_log, self.values.coefficients).reshape(len(kinds), CHANNELS, -1)
 
 
 def add_residual_rows(
@@ -231,18 +260,18 @@ def add_residual_rows(
     most_noise = np.asarray([[context.most_torque_noise], [MOST_RELATIVE_NOISE], [MOST_PULL_NOISE]])
     used = (noise < most_noise).astype(np.float32) * within  # (channels, rows)
     weight = used / sqrt(noise * noise + response.error[:, None] ** 2)
-    used = used.reshape(-1)
     values = response.add_to(features, y, context.feature_slopes)
     # rows may be out of range by their noise: a slip at the end of the range is so half the time
     margin = -NOISE_MARGIN * np.abs(context.feature_slopes.T)
     outside_noise = gemm(constant(outside.graph, margin), operating_noise, outside)
     counts = [
-        used.sum(),
+        used.sum(keepdims=False).reshape(1),
         in_range.node("Shape").astype(np.float32),
         _all_below(response, outside_noise).sum(),
     ]
     read = (readings, operating, operating_noise, y, slope)
-    system = (weight.reshape(1, -1), used.astype(np.bool_), values, in_range)
+    by_row = used.node("Transpose").reshape(-1).astype(np.bool_)
+    system = (weight.reshape(1, -1), by_row, values, in_range)
     return ResidualRows(family, response, context, *read, *system, concat(counts, axis=0))
 
 
@@ -256,44 +285,3 @@ def _all_below(response: Response, distance: Value) -> Value:
         np.float32
     )
     return inside.reduce("ReduceMin", axis=0, keepdims=False)
-
-
-def _by_log_value(basis: Value, terms: Terms, number: int, axis: PriorAxis) -> Value:
-    r"""Derivatives (terms, 1) of the monomials by the logarithm of one unknown, at a soil.
-
-    .. math:: \frac{\partial b}{\partial \ln \theta} = D b \, \frac{\theta}{d\theta / dx}
-
-    Of a friction angle it is the logarithm of its tangent, with sin(theta) cos(theta) for theta.
-    """
-    linear = terms.index((*(ONE,) * (len(terms[0]) - 1), number))
-    x = basis.take([linear], axis=0)
-    growth = exp(x * axis.rate) * axis.factor
-    value = growth + x * axis.slope + axis.shift
-    by_x = growth * axis.rate + axis.slope
-    if axis.name == FRICTION:
-        value = value.node("Sin") * value.node("Cos")
-    return basis.derived(derivative(terms, number)) * (value / by_x)
-
-
-def whiten_rows(system: Value, of_row: Value) -> Value:
-    r"""A system (columns, readings) with errors of each row (errors, readings) integrated out.
-
-    With g the changes of the residuals of one row with an error that has a normal prior with
-    standard deviation 1, the covariance of these residuals is I + g g^T. They are whitened by its
-    symmetric square root S:
-
-    .. math:: I + g g^T = S S^T, \qquad A' = S^{-1} A = A - \frac{g}{\kappa} (g^T A), \qquad
-        \kappa = 1 + g^T g + (1 + g^T g)^{1/2}
-
-    Several errors are integrated out one after another: the columns of the others are whitened as
-    the rest of the system is.
-    """
-    system, *errors = (part.reshape(0, CHANNELS, -1) for part in (system, *of_row.split(2, axis=0)))
-    while errors:
-        g = errors.pop()
-        determinant = g.sum_of_squares(axis=1, keepdims=True) + 1.0
-        scaled = g / (determinant + sqrt(determinant))
-        system, *errors = (
-            part - scaled * (g * part).sum(axis=1, keepdims=True) for part in (system, *errors)
-        )
-    return system.reshape(0, -1)

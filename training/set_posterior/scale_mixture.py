@@ -13,6 +13,7 @@ from training.onnx_graph.value import (
     composite,
     concat,
     constant,
+    either_of,
     exp,
     gemm,
     log,
@@ -83,42 +84,35 @@ class Scaled:
 def scale_mixture(
     system: Value, errors: Value, size: Value, scales: ErrorScales, present: Sequence[bool]
 ) -> Scaled:
-    r"""A system (m, terms) with errors (m, errors) of the model integrated out, for all scales.
+    r"""A system (1, m, terms) with errors (1, m, errors) of the model integrated out, by scale.
 
-    As `integrate_out` does. The determinant is the product of that of each error, given those that
-    were integrated out before it:
+    The determinant is the product of that of each error, given those that were integrated out
+    before it:
 
     .. math:: |I + E E^T| = \prod_j (1 + |g_j|^2)
 
-    size: Zero or more: the scale (1,) alone; below zero: `scales`.
+    size: Zero or more: the scale (1,) alone; below zero: `scales`. Zero leaves the system as it is.
     present: Which of `MODEL_ERROR_COLUMNS` the model can have, of which the errors are.
     """
     sizes = np.flatnonzero(present)
     of_columns, probabilities = scales.judged_first()
-    factors = where(size < 0.0, constant(system.graph, of_columns[:, None, sizes]), size)
-    whole = system.node("Unsqueeze", system.indices([0]))
-    copies = whole * np.ones((len(probabilities), 1, 1))
-    systems, determinants = concat([copies, errors * factors], axis=2), []
-    for _ in sizes:
-        systems, determinant = composite(
-            "IntegrateErrorOfScales", ["without", "determinant"], _without_last_of_scales,
-            systems=systems,
-        )  # fmt: skip
-        determinants.append(determinant)
-    log_determinant = log(concat(determinants, axis=1)).sum(axis=1, keepdims=False)
-    return Scaled(systems, np.log(probabilities)[:, None] - log_determinant * 0.5)
+
+    def integrated() -> list[Value]:
+        factors = where(size < 0.0, constant(system.graph, of_columns[:, None, sizes]), size)
+        copies = system * np.ones((len(probabilities), 1, 1))
+        whole = concat([copies, errors * factors], axis=2)
+        systems, determinants = integrate_out(whole, len(sizes))
+        log_determinant = log(concat(determinants, axis=1)).sum(axis=1, keepdims=False)
+        return [systems, np.log(probabilities)[:, None] - log_determinant * 0.5]
+
+    def alone() -> list[Value]:
+        return [system, constant(system.graph, np.zeros((1, 1)))]
+
+    return Scaled(*either_of(size * size > 0.0, integrated, alone))
 
 
-def _without_last_of_scales(systems: Value) -> list[Value]:
-    """As `_without_last`, of systems (scales, m, columns) at once, and the determinants."""
-    a, g = systems.last_columns(1)
-    determinant = g.sum_of_squares(axis=1, keepdims=True) + 1.0  # (scales, 1, 1)
-    change = g.node("Transpose", perm=[0, 2, 1]) @ a
-    return [a - (g / (determinant + sqrt(determinant))) * change, determinant]
-
-
-def integrate_out(system: Value, errors: int) -> Value:
-    r"""A system (m, columns) with the errors of its last columns integrated out.
+def integrate_out(systems: Value, errors: int) -> tuple[Value, list[Value]]:
+    r"""Systems (n, m, columns) with the errors of their last columns integrated out.
 
     With g the changes of the residuals with an error that has a normal prior with standard
     deviation 1, the covariance of these residuals is I + g g^T. They are whitened by its symmetric
@@ -129,15 +123,22 @@ def integrate_out(system: Value, errors: int) -> Value:
 
     Several errors are integrated out one after another: the columns of the others are whitened as
     the rest of the system is.
+
+    Returns: The systems, and of each error the determinants 1 + g^T g, (n, 1, 1).
     """
-    for _ in range(errors):
-        (system,) = composite("IntegrateError", ["without"], _without_last, system=system)
-    return system
+    determinants = []
+    for number in range(errors):
+        systems, determinant = composite(
+            "IntegrateError", ["whitened", "determinant"], _whitened,
+            systems=systems, column=systems.indices([-1 - number]),
+        )  # fmt: skip
+        determinants.append(determinant)
+    return systems.last_columns(errors)[0] if errors else systems, determinants
 
 
-def _without_last(system: Value) -> list[Value]:
-    """A system with the error of the last column integrated out."""
-    a, g = system.last_columns(1)
-    determinant = gemm(g, g, np.ones((1, 1)), transpose_a=True)
-    scaled = g / (determinant + sqrt(determinant))
-    return [gemm(scaled, gemm(g, a, transpose_a=True), a, alpha=-1.0)]
+def _whitened(systems: Value, column: Value) -> list[Value]:
+    """Systems whitened by the error of one column, which means nothing then, and determinants."""
+    g = systems.node("Gather", column, axis=2)
+    determinant = g.sum_of_squares(axis=1, keepdims=True) + 1.0
+    change = g.node("Transpose", perm=[0, 2, 1]) @ systems
+    return [systems - (g / (determinant + sqrt(determinant))) * change, determinant]

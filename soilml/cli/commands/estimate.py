@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from soilml.cli.options import OPTIONAL, REPEATED, InputFile, OutputFile
-from soilml.errors import InputError, TableError
+from soilml.errors import InputError
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from soilml.config.case import Case
-    from soilml.io.table import Table
-    from soilml.onboard.estimate import Estimate
     from soilml.onboard.estimator import Estimator
+    from soilml.onboard.table_estimates import TableEstimates
     from soilml.remarks import Remark
 
 FORMATS = ("table", "csv", "json")
@@ -68,15 +63,25 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from soilml.cli.output import deliver, show
+    from soilml.cli.progress import progress_bar
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.config.remainder import SAME_ROWS
     from soilml.experiment_design.expected_answers import trained_case
-    from soilml.identification.model_error_inputs import trained_remainder, with_exact_model
-    from soilml.identification.trained_estimator import check_table_wheel, estimators_for_case
+    from soilml.identification.model_error_inputs import (
+        readings_with_model_error,
+        trained_remainder,
+        with_exact_model,
+    )
+    from soilml.identification.trained_estimator import (
+        check_table_wheel,
+        estimators_for_case,
+        narrower_priors,
+    )
     from soilml.io.bounds import ESTIMATES
     from soilml.io.read_table import FILLED, RUNS
-    from soilml.onboard import presentation, table_estimates
+    from soilml.onboard import presentation
     from soilml.onboard.estimator import Estimator
+    from soilml.onboard.table_estimates import estimates_of_table
     from soilml.quantities import column
     from soilml.remarks import texts
 
@@ -111,29 +116,21 @@ def run(args: argparse.Namespace) -> int:
     trained = None if case is not None else trained_case(estimators[0])
     hinted = case if trained is None else trained[0]
     print_table_hints(table, hinted, presentation.trained_radius(estimators[0]))
-    complete = [table_estimates.complete_rows(estimator, table) for estimator in estimators]
-    usable = [rows & table.answered for rows in complete]
-    if not np.any(usable):
-        wanted = ", ".join(column(n) for n in estimators[0].inputs)
-        raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
-    if args.by is None:
-        columns, own = _row_estimates(estimators, table, usable, case)
-    else:
-        columns, own = _group_estimates(estimators[0], table, usable[0], args.by, case)
-    remarks += own
-    if args.by is None or estimators[0].sets is None:
-        remarks += table_estimates.unused_std_remarks(estimators[0], table)
-    some = np.any(complete, axis=0)
-    remarks += table_estimates.excluded_rows(table, ~some, "missing-reading", "lack a reading")
-    unanswered = some & ~table.answered
-    remarks += table_estimates.excluded_rows(
-        table, unanswered, "status-not-ok", "have a status that is not ok"
-    )
+    pooled, first = args.by is not None, estimators[0]
+    box = narrower_priors(first, case) if case is not None and pooled else {}
+    found = estimates_of_table(
+        estimators, table, args.by, box=box, progress=progress_bar,
+        adjusted=lambda one, readings: readings_with_model_error(
+            one, readings, case, together=pooled
+        ),
+    )  # fmt: skip
+    columns = found.columns(list(dict.fromkeys(n for one in estimators for n in one.inputs)))
+    remarks += presentation.remarks_on(found, estimators) + _advice(found)
     if args.report is not None:
         presentation.check_size(len(columns["in_range"]))
 
     title = f"Estimates of {Path(args.runs).name} by {Path(args.trained).name}"
-    report = presentation.estimate_report(columns, remarks, estimators[0], args.by, title)
+    report = presentation.estimate_report(found, columns, remarks, title)
     content = {
         "columns": {k: np.asarray(v).tolist() for k, v in columns.items()},
         "notes": [remark.as_json() for remark in remarks],
@@ -160,134 +157,24 @@ def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> Non
         )
 
 
-def _row_estimates(
-    estimators: list[Estimator],
-    table: Table,
-    usable: list[NDArray[np.bool_]],
-    case: Case | None,
-) -> tuple[dict[str, Any], list[Remark]]:
-    """Columns with a line for every row, blank where no model has all its readings, and remarks."""
+def _advice(found: TableEstimates) -> list[Remark]:
+    """What to measure after a typical row, or after the group that is known least."""
     import numpy as np
 
     from soilml.experiment_design.next_rows import advice_after_estimate
-    from soilml.onboard import presentation, table_estimates
-    from soilml.onboard.multi_sensor import fuse_estimates
-    from soilml.quantities import column
-    from soilml.remarks import Remark
-
-    estimates = [_all_rows(*parts, table, case) for parts in zip(estimators, usable, strict=True)]
-    answered = np.any(usable, axis=0)
-    inputs = dict.fromkeys(name for estimator in estimators for name in estimator.inputs)
-    columns: dict[str, Any] = {"run": table["run"]}
-    columns |= {column(name): table[column(name)] for name in inputs}
-    estimate, files = estimates[0], None
-    if len(estimators) > 1:
-        combined = fuse_estimates(estimates)
-        estimate, files = combined.estimate, combined.used.sum(axis=0)
-    for key, values in presentation.estimate_columns(estimate).items():
-        columns[key] = np.where(answered, values, np.nan)
-    columns["in_range"] = answered & estimate.in_range
-    if files is not None:
-        columns["files"] = files
-    hint = "pool rows with --by run"
-    if estimators[0].per_row:
-        hint = "measure with other sensors too, or train for a narrower prior of the soil,"
-    remarks = presentation.width_remarks(estimate, "a single row", "does", hint)
-    if len(estimators) > 1:
-        remarks.append(Remark("fused", f"fused by the rule {combined.rule}", severity="note"))
-    elif estimate.in_range.any():
-        row = presentation.median_row(estimate)
-        readings = table_estimates.row_readings(estimators[0], table.rows(np.asarray([row])))
-        advised = advice_after_estimate(
-            estimators[0], estimate.mean[row], estimate.covariance[row], readings
-        )
-        head = f"after {table.place(row)} alone, a typical row: "
-        remarks += [best.under(head) for best in advised[-1:]]
-    outside = int(np.count_nonzero(answered & ~estimate.in_range))
-    if outside:
-        why = "" if files is None else ", or the files contradict each other there"
-        text = f"{outside} of {int(answered.sum())} rows are out of range{why}: "
-        remarks.append(Remark("out-of-range", f"{text}their estimate is the prior"))
-    return columns, remarks
-
-
-def _all_rows(
-    estimator: Estimator, usable: NDArray[np.bool_], table: Table, case: Case | None
-) -> Estimate:
-    """An estimate for every row; one that is not usable counts as out of range."""
-    from soilml.cli.progress import progress_bar
-    from soilml.identification.model_error_inputs import readings_with_model_error
-    from soilml.onboard import table_estimates
-
-    rows = table.rows(usable)
-    readings = table_estimates.row_readings(estimator, rows)
-    if estimator.sets is not None and estimator.sets.sets_only:
-        readings = table_estimates.joint_readings(estimator, rows)
-    readings = readings_with_model_error(estimator, readings, case, together=False)
-    with progress_bar(f"estimating {len(rows)} rows", len(rows)) as done:
-        return table_estimates.estimates_of_rows(estimator, readings, usable, done)
-
-
-def _group_estimates(
-    estimator: Estimator, table: Table, usable: NDArray[np.bool_], by: str, case: Case | None
-) -> tuple[dict[str, Any], list[Remark]]:
-    """Columns with a line for every value of a column, from all its usable rows, and remarks."""
-    import numpy as np
-
-    from soilml.cli.progress import working
-    from soilml.experiment_design.next_rows import advice_after_estimate
-    from soilml.identification.model_error_inputs import readings_with_model_error
-    from soilml.identification.trained_estimator import narrower_priors
     from soilml.io.table import ALL
     from soilml.onboard import presentation, table_estimates
 
-    order = [name for name, _ in table.groups(by)]
-    groups = list(table.rows(usable).groups(by))
-    names = [name for name, _ in groups]
-    readings = [
-        readings_with_model_error(
-            estimator, table_estimates.joint_readings(estimator, rows), case, together=True
-        )
-        for _, rows in groups
-    ]
-    box = {} if case is None else narrower_priors(estimator, case)
-    counts = np.asarray([len(rows) for _, rows in groups])
-    with working(f"estimating by {by}"):
-        estimate = table_estimates.estimates_of_runs(estimator, readings, box)
-    outside = estimate.rows_set_aside
-    position = {name: i for i, name in enumerate(names)}
-    answered = np.asarray([name in position for name in order])
-    index = np.asarray([position.get(name, 0) for name in order])
-    columns: dict[str, Any] = {
-        by: np.asarray(order),
-        "rows": np.where(answered, counts[index], 0),
-        "rows_in_range": np.where(answered, (counts - outside)[index], 0),
-    }
-    for key, values in presentation.estimate_columns(estimate).items():
-        columns[key] = np.where(answered, values[index], np.nan)
-    columns["in_range"] = answered & estimate.in_range[index]
-    if estimator.sets is not None:
-        columns["disagrees"] = answered & estimate.disagrees[index].astype(bool)
-    remarks = table_estimates.channel_remarks(
-        estimator, table_estimates.joint_readings(estimator, table.rows(usable))
-    )
-    whose = "all rows" if by == ALL else f"all rows of a {by}"
-    better = "measure other loads and slips"
-    if by != ALL and len(groups) > 1:
-        better += f", or take those of one soil together, such as --by {ALL},"
-    remarks += presentation.width_remarks(estimate, whose, "do", better)
-    if estimate.in_range.any():
-        name = names[i := presentation.widest_row(estimate)]
-        head = "" if by == ALL else f"{by} {name}: "
-        remarks += [
-            one.under(head)
-            for one in advice_after_estimate(
-                estimator,
-                estimate.mean[i],
-                estimate.covariance[i],
-                readings[i],
-                box,
-            )
-        ]
-    remarks += presentation.refusal_remarks(by, names, outside, counts, estimate)
-    return columns, remarks
+    place = presentation.typical(found)
+    if place is None or found.rule is not None:
+        return []
+    if found.by is None:
+        row = found.table.rows(np.asarray([place]))
+        readings = table_estimates.row_readings(found.estimator, row)
+        head = f"after {found.table.place(place)} alone, a typical row: "
+    else:
+        readings = found.readings[int(found.answered[:place].sum())]
+        head = "" if found.by == ALL else f"{found.by} {found.names[place]}: "
+    own = found.estimate.mean[place], found.estimate.covariance[place]
+    advised = advice_after_estimate(found.estimator, *own, readings, found.box)
+    return [one.under(head) for one in (advised[-1:] if found.by is None else advised)]

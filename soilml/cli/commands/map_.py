@@ -76,7 +76,9 @@ def run(args: argparse.Namespace) -> int:
         need("tifffile", "drive map --out", "map")
         need("matplotlib", "drive map --out")
     table = read_rows(args, NEEDED, NEEDED[:2])
-    case = read_case_of_rows(args, args.rover, table, available_effects(args))
+    case = read_case_of_rows(
+        args, args.rover, table, available_effects(args), with_explanations=True
+    )
     with stage_progress() as progress:
         found = soil_map(
             case,

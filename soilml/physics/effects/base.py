@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any, ClassVar, TypeVar, final
+from typing import Annotated, Any, ClassVar, TypeVar, dataclass_transform, final
 
 from soilml.arrays import Array, Real, namespace
 from soilml.errors import InputError
@@ -164,6 +164,20 @@ class Effect:
     def on_reading(self, force: Force, load_case: LoadCase) -> Force:
         """What the sensors report, from the forces at equilibrium."""
         return force
+
+
+E = TypeVar("E", bound=Effect)
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+def effect(name: str, **card: Any) -> Callable[[type[E]], type[E]]:
+    """Declare an effect: a frozen dataclass with this name and a card, see `EffectCard`."""
+
+    def made(cls: type[E]) -> type[E]:
+        cls.name, cls.about = name, EffectCard(**card)
+        return dataclass(frozen=True, kw_only=True)(cls)
+
+    return made
 
 
 @cache

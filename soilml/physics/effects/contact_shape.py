@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, final
+from dataclasses import replace
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from soilml.arrays import Real, namespace, to_numpy
 from soilml.errors import InputError
 from soilml.parameters import Parameter
-from soilml.physics.effects.base import EffectCard, SlipLoadScaling
+from soilml.physics.effects.base import SlipLoadScaling, effect
 from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc, entry_angle
 from soilml.physics.gears.wheel import Wheel
 from soilml.physics.load_case import LoadCase
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "exit-angle",
+    text="the rim touches the soil behind the axle too: theta_2 below zero",
+    source="Ishigami et al. 2007, J. Field Robotics 24(3); Ding et al. 2011",
+    kind="soil",
+    reference={"kappa": 0.15},
+    signs={"drawbar_pull": +1, "sinkage": -1},
+    isolate="runs near zero slip; the wheel weighed on its stand",
+)
 class ExitAngle(SlipLoadScaling):
     r"""The soil springs back, or clings, and touches the rim behind the axle too.
 
@@ -32,15 +39,6 @@ class ExitAngle(SlipLoadScaling):
     J. Field Robotics 24(3), 2007; b0, Ding et al. 2011. For wheels.
     """
 
-    name: ClassVar[str] = "exit-angle"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the rim touches the soil behind the axle too: theta_2 below zero",
-        source="Ishigami et al. 2007, J. Field Robotics 24(3); Ding et al. 2011",
-        kind="soil",
-        reference={"kappa": 0.15},
-        signs={"drawbar_pull": +1, "sinkage": -1},
-        isolate="runs near zero slip; the wheel weighed on its stand",
-    )
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     kappa: Annotated[Real, Parameter("1", 0.0, 1.0, "height at exit / sinkage")] = 0.0
     b0: Annotated[Real, Parameter("1", -1.0, 0.0, "theta_2 / theta_1")] = 0.0
@@ -58,8 +56,15 @@ class ExitAngle(SlipLoadScaling):
         return replace(rim, exit=rim.exit + behind + self.b0 * rim.entry)
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "stress-shift",
+    text="stresses sit at the front of the contact: small wheels",
+    source="Nagatani et al. 2009, IROS, sec. IV",
+    kind="soil",
+    reference={"shift": 0.2},
+    signs={"drawbar_pull": -1, "sinkage": +1},
+    isolate="force sensors in the rim; the same soil under a larger wheel",
+)
 class StressShift(SlipLoadScaling):
     r"""Under a small wheel the stressed arc is shorter than the contact and lies at its front.
 
@@ -74,15 +79,6 @@ class StressShift(SlipLoadScaling):
     sink to carry its load. Not for wheels above half a metre.
     """
 
-    name: ClassVar[str] = "stress-shift"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="stresses sit at the front of the contact: small wheels",
-        source="Nagatani et al. 2009, IROS, sec. IV",
-        kind="soil",
-        reference={"shift": 0.2},
-        signs={"drawbar_pull": -1, "sinkage": +1},
-        isolate="force sensors in the rim; the same soil under a larger wheel",
-    )
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     shift: Annotated[Real, Parameter("1", 0.0, 0.9, "share of the way to the entry angle")] = 0.0
 
@@ -95,8 +91,16 @@ class StressShift(SlipLoadScaling):
         )
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "wheel-flexibility",
+    text="the wheel deflects under its load and touches along a longer arc",
+    source="Bekker 1969; Schmid 1995, J. Terramechanics 32(1)",
+    kind="wheel",
+    reference={"compliance": 2e-5},
+    signs={"drawbar_pull": +1, "sinkage": -1},
+    isolate="pressing the wheel on a flat plate and measuring how far the axle comes down",
+    family="flexible rim",
+)
 class WheelFlexibility(SlipLoadScaling):
     r"""A wheel that gives way touches the soil along a longer arc, as a larger rigid wheel would.
 
@@ -111,16 +115,6 @@ class WheelFlexibility(SlipLoadScaling):
     of the order of the radius, nor for a rim that lies flat (`flat-rim`).
     """
 
-    name: ClassVar[str] = "wheel-flexibility"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the wheel deflects under its load and touches along a longer arc",
-        source="Bekker 1969; Schmid 1995, J. Terramechanics 32(1)",
-        kind="wheel",
-        reference={"compliance": 2e-5},
-        signs={"drawbar_pull": +1, "sinkage": -1},
-        isolate="pressing the wheel on a flat plate and measuring how far the axle comes down",
-        family="flexible rim",
-    )
     law_terms: ClassVar[tuple[str, ...]] = ("by_load",)
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     compliance: Annotated[Real, Parameter("m/N", 0.0, 1e-2, "C, deflection per load")] = 0.0
@@ -144,8 +138,16 @@ class WheelFlexibility(SlipLoadScaling):
 MOST_DEFLECTION = 0.3  # Largest deflection, as a fraction of the radius
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "flat-rim",
+    text="the rim gives way and lies flat on the soil along a chord",
+    source="Bekker 1969; Wong, Theory of Ground Vehicles, ch. 2",
+    kind="wheel",
+    reference={"compliance": 2e-5},
+    signs={"drawbar_pull": +1, "sinkage": -1},
+    isolate="pressing the wheel on a flat plate and measuring how far the axle comes down",
+    family="flexible rim",
+)
 class FlatRim(SlipLoadScaling):
     r"""A rim that gives way lies flat on the soil along a chord, before and behind the axle.
 
@@ -162,16 +164,6 @@ class FlatRim(SlipLoadScaling):
     deflections above 0.3 of the radius.
     """
 
-    name: ClassVar[str] = "flat-rim"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the rim gives way and lies flat on the soil along a chord",
-        source="Bekker 1969; Wong, Theory of Ground Vehicles, ch. 2",
-        kind="wheel",
-        reference={"compliance": 2e-5},
-        signs={"drawbar_pull": +1, "sinkage": -1},
-        isolate="pressing the wheel on a flat plate and measuring how far the axle comes down",
-        family="flexible rim",
-    )
     law_terms: ClassVar[tuple[str, ...]] = ("by_load",)
     load_rises: ClassVar[bool] = True
     more_points: ClassVar[bool] = True
@@ -196,8 +188,15 @@ class FlatRim(SlipLoadScaling):
         )
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "clogging",
+    text="a larger wheel: soil on the rim or between lugs, or lugs, with the slip of the rim",
+    source="Ding et al. 2011, J. Terramechanics 48(1), radius of shearing",
+    kind="wheel",
+    reference={"layer": 0.003},
+    signs={"torque": +1, "drawbar_pull": +1},
+    isolate="measure the lugs; the same runs with the wheel brushed clean before each",
+)
 class Clogging(SlipLoadScaling):
     r"""Soil clings to the rim, or fills the room between its lugs: the wheel is a larger one.
 
@@ -215,15 +214,6 @@ class Clogging(SlipLoadScaling):
     within a turn.
     """
 
-    name: ClassVar[str] = "clogging"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="a larger wheel: soil on the rim or between lugs, or lugs, with the slip of the rim",
-        source="Ding et al. 2011, J. Terramechanics 48(1), radius of shearing",
-        kind="wheel",
-        reference={"layer": 0.003},
-        signs={"torque": +1, "drawbar_pull": +1},
-        isolate="measure the lugs; the same runs with the wheel brushed clean before each",
-    )
     load_rises: ClassVar[bool] = True
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     layer: Annotated[Real, Parameter("m", 0.0, 0.1, "h, thickness of the layer of soil")] = 0.0

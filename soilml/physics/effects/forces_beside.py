@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, cast, final
+from dataclasses import replace
+from typing import Annotated, ClassVar, cast
 
 from soilml.arrays import Array, Real, namespace
 from soilml.numerics.quadrature import columns, gauss
 from soilml.parameters import Parameter
 from soilml.physics.contact import Force, Stress, mobilised_fraction, travel_ratio
-from soilml.physics.effects.base import Effect, EffectCard, SlipLoadScaling, covariate
+from soilml.physics.effects.base import Effect, SlipLoadScaling, covariate, effect
 from soilml.physics.gears.rigid_wheel import (
     RigidWheel,
     WheelArc,
@@ -22,8 +22,15 @@ from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "bulldozing",
+    text="the wheel pushes a wall of soil before it: less drawbar pull",
+    source="Bekker 1969; Wong, Theory of Ground Vehicles, ch. 2",
+    kind="soil",
+    reference={"share": 1.0},
+    signs={"drawbar_pull": -1},
+    isolate="the same runs driven the other way, which turns a slope around; heavier loads",
+)
 class Bulldozing(SlipLoadScaling):
     r"""The wheel pushes a wall of soil before it; drawbar pull alone pays for it.
 
@@ -39,15 +46,6 @@ class Bulldozing(SlipLoadScaling):
     way the wheel slips.
     """
 
-    name: ClassVar[str] = "bulldozing"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the wheel pushes a wall of soil before it: less drawbar pull",
-        source="Bekker 1969; Wong, Theory of Ground Vehicles, ch. 2",
-        kind="soil",
-        reference={"share": 1.0},
-        signs={"drawbar_pull": -1},
-        isolate="the same runs driven the other way, which turns a slope around; heavier loads",
-    )
     share: Annotated[Real, Parameter("1", 0.0, 5.0, "times the formula's resistance")] = 0.0
 
     def on_force(self, force: Force, load_case: LoadCase) -> Force:
@@ -69,8 +67,15 @@ class Bulldozing(SlipLoadScaling):
         return replace(force, drawbar_pull=force.drawbar_pull - share * resistance)
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "sidewall-shear",
+    text="the buried side walls shear the soil too: more torque and pull",
+    source="geometry; Jaky 1944; Janosi and Hanamoto 1961",
+    kind="soil",
+    reference={"share": 1.0},
+    signs={"torque": +1, "drawbar_pull": +1},
+    isolate="the same runs with a wheel of another width; heavier loads, which bury more wall",
+)
 class SidewallShear(SlipLoadScaling):
     r"""The two side walls of the wheel shear the soil that they are buried in.
 
@@ -90,15 +95,6 @@ class SidewallShear(SlipLoadScaling):
     spokes or soil inside.
     """
 
-    name: ClassVar[str] = "sidewall-shear"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the buried side walls shear the soil too: more torque and pull",
-        source="geometry; Jaky 1944; Janosi and Hanamoto 1961",
-        kind="soil",
-        reference={"share": 1.0},
-        signs={"torque": +1, "drawbar_pull": +1},
-        isolate="the same runs with a wheel of another width; heavier loads, which bury more wall",
-    )
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     share: Annotated[Real, Parameter("1", 0.0, 5.0, "times the formula's shear")] = 0.0
 
@@ -139,8 +135,16 @@ def buried(entry: Array) -> tuple[Array, Array]:
     return area, xp.sum(strip * below, axis=0) / area
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "lateral-slip",
+    text="sliding sideways uses up shear strength that would drive",
+    source="Yoshida and Ishigami 2004, IROS; Ishigami et al. 2007",
+    kind="soil",
+    reference={"share": 1.0},
+    signs={"torque": -1, "drawbar_pull": -1},
+    isolate="the same runs with the wheel held straight, and at several slip angles",
+    needs=("slip_angle",),
+)
 class LateralSlip(SlipLoadScaling):
     r"""A wheel that slides sideways too shears the soil along its slip velocity.
 
@@ -157,16 +161,6 @@ class LateralSlip(SlipLoadScaling):
     output.
     """
 
-    name: ClassVar[str] = "lateral-slip"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="sliding sideways uses up shear strength that would drive",
-        source="Yoshida and Ishigami 2004, IROS; Ishigami et al. 2007",
-        kind="soil",
-        reference={"share": 1.0},
-        signs={"torque": -1, "drawbar_pull": -1},
-        isolate="the same runs with the wheel held straight, and at several slip angles",
-        needs=("slip_angle",),
-    )
     share: Annotated[Real, Parameter("1", 0.0, 5.0, "times the sideways displacement")] = 0.0
 
     def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
@@ -183,8 +177,16 @@ class LateralSlip(SlipLoadScaling):
         return replace(stress, shear=stress.shear * factor)
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "bearing-friction",
+    text="friction of the bearing is in the measured torque",
+    source="Coulomb friction",
+    kind="rig",
+    reference={"coefficient": 0.01},
+    signs={"torque": +1},
+    isolate="turning the wheel, loaded, on a smooth roller or a second bearing",
+    calibration=0.005,
+)
 class BearingFriction(Effect):
     r"""The motor turns the bearing too: its torque is more than what the soil asks for.
 
@@ -195,16 +197,6 @@ class BearingFriction(Effect):
     friction is on the motor. Not for seals and gears, whose friction the load does not change.
     """
 
-    name: ClassVar[str] = "bearing-friction"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="friction of the bearing is in the measured torque",
-        source="Coulomb friction",
-        kind="rig",
-        reference={"coefficient": 0.01},
-        signs={"torque": +1},
-        isolate="turning the wheel, loaded, on a smooth roller or a second bearing",
-        calibration=0.005,
-    )
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     coefficient: Annotated[Real, Parameter("1", 0.0, 0.3, "mu, referred to r")] = 0.0
 
@@ -213,8 +205,16 @@ class BearingFriction(Effect):
         return replace(force, torque=force.torque + self.coefficient * load_case.at.load * radius)
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "slope",
+    text="the bed is inclined: weight pulls the wheel back, or forward in reverse",
+    source="statics of a body on a slope",
+    kind="rig",
+    reference={"angle": 0.0175},
+    signs={"drawbar_pull": -1},
+    isolate="the same runs driven the other way; a spirit level on the bed",
+    calibration=0.005,
+)
 class Slope(Effect):
     r"""The bed has an unnoticed slope: driving goes uphill, or downhill in reverse.
 
@@ -226,16 +226,6 @@ class Slope(Effect):
     those on which the soil itself is close to sliding.
     """
 
-    name: ClassVar[str] = "slope"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the bed is inclined: weight pulls the wheel back, or forward in reverse",
-        source="statics of a body on a slope",
-        kind="rig",
-        reference={"angle": 0.0175},
-        signs={"drawbar_pull": -1},
-        isolate="the same runs driven the other way; a spirit level on the bed",
-        calibration=0.005,
-    )
     angle: Annotated[Real, Parameter("rad", -0.5, 0.5, "uphill is positive")] = 0.0
 
     def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
@@ -251,8 +241,16 @@ class Slope(Effect):
         return replace(force, drawbar_pull=force.drawbar_pull - along)
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "load-transfer",
+    text="drawbar pull presses the wheel down, or lifts it, past the load cell",
+    source="moments about the rig's arm",
+    kind="rig",
+    reference={"ratio": 0.1},
+    signs={},
+    isolate="weighing the wheel on its stand while the drawbar is pulled by hand",
+    calibration=0.03,
+)
 class LoadTransfer(Effect):
     r"""The rig presses the wheel down by more than its load cell says: the pull has a lever arm.
 
@@ -265,16 +263,6 @@ class LoadTransfer(Effect):
     that the constant part would take below zero is a wheel that barely touches, 1 uN.
     """
 
-    name: ClassVar[str] = "load-transfer"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="drawbar pull presses the wheel down, or lifts it, past the load cell",
-        source="moments about the rig's arm",
-        kind="rig",
-        reference={"ratio": 0.1},
-        signs={},
-        isolate="weighing the wheel on its stand while the drawbar is pulled by hand",
-        calibration=0.03,
-    )
     ratio: Annotated[Real, Parameter("1", -0.5, 0.5, "h / L, load gained per pull")] = 0.0
     offset: Annotated[Real, Parameter("N", -100.0, 100.0, "W0, load gained always")] = 0.0
 
@@ -287,8 +275,16 @@ class LoadTransfer(Effect):
         return replace(force, load=force.load - self.ratio * force.drawbar_pull)
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "camber",
+    text="the wheel is inclined to the side: one edge digs in",
+    source="geometry; slices across the width",
+    kind="rig",
+    reference={"angle": 0.15},
+    signs={"sinkage": -1},
+    isolate="a spirit level on the side of the wheel, under load",
+    calibration=0.03,
+)
 class Camber(Effect):
     r"""The wheel is inclined to the side: its lower edge is deeper in the soil than the upper.
 
@@ -303,16 +299,6 @@ class Camber(Effect):
     heaped up beside the wheel, are left out.
     """
 
-    name: ClassVar[str] = "camber"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the wheel is inclined to the side: one edge digs in",
-        source="geometry; slices across the width",
-        kind="rig",
-        reference={"angle": 0.15},
-        signs={"sinkage": -1},
-        isolate="a spirit level on the side of the wheel, under load",
-        calibration=0.03,
-    )
     load_rises: ClassVar[bool] = True
     more_points: ClassVar[bool] = True
     gear_types: ClassVar[tuple[type, ...]] = (Wheel,)

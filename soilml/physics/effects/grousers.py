@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, final
+from dataclasses import replace
+from typing import Annotated, ClassVar
 
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.contact import Stress, slip_sign
-from soilml.physics.effects.base import EffectCard, SlipLoadScaling
+from soilml.physics.effects.base import SlipLoadScaling, effect
 from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.gears.track import Track
 from soilml.physics.load_case import LoadCase
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "grousers",
+    text="lugs carry the soil around: it shears further out than the rim",
+    source="Ding et al. 2011, J. Terramechanics 48(1)",
+    kind="wheel",
+    reference={"height": 0.01},
+    signs={"torque": +1, "drawbar_pull": +1},
+    isolate="the same runs with a wheel without lugs; a dead-weight check of the torque sensor",
+)
 class Grousers(SlipLoadScaling):
     r"""Lugs carry the soil between them around: it shears further out than the rim.
 
@@ -39,15 +46,6 @@ class Grousers(SlipLoadScaling):
     measured drawbar pull of small lugged wheels.
     """
 
-    name: ClassVar[str] = "grousers"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="lugs carry the soil around: it shears further out than the rim",
-        source="Ding et al. 2011, J. Terramechanics 48(1)",
-        kind="wheel",
-        reference={"height": 0.01},
-        signs={"torque": +1, "drawbar_pull": +1},
-        isolate="the same runs with a wheel without lugs; a dead-weight check of the torque sensor",
-    )
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     height: Annotated[Real, Parameter("m", 0.0, 0.2, "h, height of a lug above the rim")] = 0.0
     shearing: Annotated[Real, Parameter("1", 0.0, 1.0, "lambda, share of h added to r")] = 0.75
@@ -66,8 +64,15 @@ class Grousers(SlipLoadScaling):
         )
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "track-grousers",
+    text="grousers of a track shear soil on soil, and cohesion beside the track",
+    source="Wang et al. 2018, J. Terramechanics 77, eqs. 10-14",
+    kind="wheel",
+    reference={"spacing": 0.8},
+    signs={"torque": +1, "drawbar_pull": +1},
+    isolate="the same runs with a track without grousers",
+)
 class TrackGrousers(SlipLoadScaling):
     r"""Between the tips of its grousers a track shears soil on soil, and soil beside the track.
 
@@ -89,15 +94,6 @@ class TrackGrousers(SlipLoadScaling):
     soften.
     """
 
-    name: ClassVar[str] = "track-grousers"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="grousers of a track shear soil on soil, and cohesion beside the track",
-        source="Wang et al. 2018, J. Terramechanics 77, eqs. 10-14",
-        kind="wheel",
-        reference={"spacing": 0.8},
-        signs={"torque": +1, "drawbar_pull": +1},
-        isolate="the same runs with a track without grousers",
-    )
     gear_types: ClassVar[tuple[type, ...]] = (Track,)
     spacing: Annotated[Real, Parameter("1", 0.0, 1.0, "g, share of the pitch between tips")] = 0.0
     height: Annotated[Real, Parameter("m", 0.0, 0.2, "h, height of a grouser")] = 0.012

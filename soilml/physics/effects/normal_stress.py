@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, final
+from typing import Annotated, ClassVar
 
 from soilml.arrays import Array, Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.contact import Stress, with_normal
-from soilml.physics.effects.base import EffectCard, SlipLoadScaling
+from soilml.physics.effects.base import SlipLoadScaling, effect
 from soilml.physics.gears.rigid_wheel import RigidWheel, largest_pressure, way_to_peak
 from soilml.physics.gears.track import Track
 from soilml.physics.gears.wheel import Wheel
@@ -49,8 +49,16 @@ class StressShape(SlipLoadScaling):
         return with_normal(stress, xp.maximum(normal, xp.zeros_like(normal)), soil)
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "elliptic-pressure",
+    text="normal stress has the shape of an ellipse along the contact",
+    source="Johnson, Contact Mechanics, 1985, sec. 4.2",
+    kind="soil",
+    reference={"share": 0.5},
+    signs={"sinkage": -1},
+    isolate="force sensors in the rim; sinkage at several loads and slips",
+    family="shape of normal stress",
+)
 class EllipticPressure(StressShape):
     r"""The normal stress rises and falls along an ellipse, steeply at both ends of the contact.
 
@@ -62,25 +70,22 @@ class EllipticPressure(StressShape):
     `linear-wheel`, whose stresses are straight lines.
     """
 
-    name: ClassVar[str] = "elliptic-pressure"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="normal stress has the shape of an ellipse along the contact",
-        source="Johnson, Contact Mechanics, 1985, sec. 4.2",
-        kind="soil",
-        reference={"share": 0.5},
-        signs={"sinkage": -1},
-        isolate="force sensors in the rim; sinkage at several loads and slips",
-        family="shape of normal stress",
-    )
-
     def shape(self, square: Array) -> Array:
         """The root of 1 - xi^2, which has a derivative at the ends too."""
         xp = namespace(square)
         return xp.sqrt(xp.maximum(square, xp.full_like(square, SMALLEST_SQUARE)))
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "parabolic-pressure",
+    text="normal stress has the shape of a parabola along the contact",
+    source="Soehne 1953, Grundlagen der Landtechnik 5",
+    kind="soil",
+    reference={"share": 0.5},
+    signs={"sinkage": -1},
+    isolate="force sensors in the rim; sinkage at several loads and slips",
+    family="shape of normal stress",
+)
 class ParabolicPressure(StressShape):
     r"""The normal stress rises and falls along a parabola between the ends of the contact.
 
@@ -93,21 +98,27 @@ class ParabolicPressure(StressShape):
     are straight lines.
     """
 
-    name: ClassVar[str] = "parabolic-pressure"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="normal stress has the shape of a parabola along the contact",
-        source="Soehne 1953, Grundlagen der Landtechnik 5",
-        kind="soil",
-        reference={"share": 0.5},
-        signs={"sinkage": -1},
-        isolate="force sensors in the rim; sinkage at several loads and slips",
-        family="shape of normal stress",
-    )
 
-
-@final
 @dataclass(frozen=True, kw_only=True)
-class SaturatingPressure(SlipLoadScaling):
+class PressureLaw(SlipLoadScaling):
+    """A law of pressure against sinkage, the same at all slips and loads."""
+
+    law_terms: ClassVar[tuple[str, ...]] = ()
+    load_rises: ClassVar[bool] = True
+    gear_types: ClassVar[tuple[type, ...]] = (RigidWheel, Track)
+
+
+@effect(
+    "saturating-pressure",
+    text="pressure approaches a limit with depth: heavy wheels sink further",
+    source="Wong, Theory of Ground Vehicles, ch. 2; Kacigin and Guskov 1968",
+    kind="soil",
+    reference={"softness": 2e-5},
+    signs={"sinkage": +1},
+    isolate="plate tests to large sinkage; sinkage under a wide range of loads",
+    family="pressure by sinkage",
+)
+class SaturatingPressure(PressureLaw):
     r"""The pressure approaches a limit as the gear sinks: the soil yields instead of hardening.
 
     .. math:: \sigma \leftarrow \frac{1 - e^{-a \sigma}}{a}, \qquad \sigma_\infty = 1 / a
@@ -118,19 +129,6 @@ class SaturatingPressure(SlipLoadScaling):
     The exponent n beside it is ours. A load near the limit has no equilibrium, and the row says so.
     """
 
-    name: ClassVar[str] = "saturating-pressure"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="pressure approaches a limit with depth: heavy wheels sink further",
-        source="Wong, Theory of Ground Vehicles, ch. 2; Kacigin and Guskov 1968",
-        kind="soil",
-        reference={"softness": 2e-5},
-        signs={"sinkage": +1},
-        isolate="plate tests to large sinkage; sinkage under a wide range of loads",
-        family="pressure by sinkage",
-    )
-    law_terms: ClassVar[tuple[str, ...]] = ()
-    load_rises: ClassVar[bool] = True
-    gear_types: ClassVar[tuple[type, ...]] = (RigidWheel, Track)
     softness: Annotated[Real, Parameter("1/Pa", 0.0, 1e-3, "a, 1 / limit of pressure")] = 0.0
 
     def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
@@ -140,9 +138,17 @@ class SaturatingPressure(SlipLoadScaling):
         return with_normal(stress, stress.normal * (-xp.expm1(-share) / share), load_case.soil)
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
-class FirmBase(SlipLoadScaling):
+@effect(
+    "firm-base",
+    text="a firm base below loose soil stops the wheel",
+    source="Wong, Theory of Ground Vehicles, ch. 2",
+    kind="soil",
+    reference={"nearness": 40.0},
+    signs={"sinkage": -1},
+    isolate="a plate or a rod pressed down to the base; heavier loads, which come nearer to it",
+    family="pressure by sinkage",
+)
+class FirmBase(PressureLaw):
     r"""Loose soil lies on a firm base: below a depth the pressure rises steeply.
 
     .. math:: \sigma \leftarrow \sigma [1 + (a z)^m], \qquad H = 1 / a
@@ -153,19 +159,6 @@ class FirmBase(SlipLoadScaling):
     wheels far above the base it is a larger exponent n.
     """
 
-    name: ClassVar[str] = "firm-base"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="a firm base below loose soil stops the wheel",
-        source="Wong, Theory of Ground Vehicles, ch. 2",
-        kind="soil",
-        reference={"nearness": 40.0},
-        signs={"sinkage": -1},
-        isolate="a plate or a rod pressed down to the base; heavier loads, which come nearer to it",
-        family="pressure by sinkage",
-    )
-    law_terms: ClassVar[tuple[str, ...]] = ()
-    load_rises: ClassVar[bool] = True
-    gear_types: ClassVar[tuple[type, ...]] = (RigidWheel, Track)
     nearness: Annotated[Real, Parameter("1/m", 0.0, 500.0, "a, 1 / depth of the base")] = 0.0
     steepness: Annotated[Real, Parameter("1", 1.0, 12.0, "m, power of the depth")] = 4.0
 
@@ -177,9 +170,17 @@ class FirmBase(SlipLoadScaling):
         return with_normal(stress, stress.normal * firmer, load_case.soil)
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
-class SoftCrust(SlipLoadScaling):
+@effect(
+    "soft-crust",
+    text="a soft layer on firmer ground carries less than the ground",
+    source="Wong, Theory of Ground Vehicles, ch. 2",
+    kind="soil",
+    reference={"deficit": 1500.0},
+    signs={"sinkage": 1},
+    isolate="a plate or a rod pressed down through the layer; lighter loads, which stay in it",
+    family="pressure by sinkage",
+)
+class SoftCrust(PressureLaw):
     r"""A soft or loose layer lies on firmer ground: the pressure lacks a share at small depth.
 
     .. math:: \sigma \leftarrow \sigma - p_0 (1 - e^{-\sigma / p_0})
@@ -191,19 +192,6 @@ class SoftCrust(SlipLoadScaling):
     within the layer, whose soil it is.
     """
 
-    name: ClassVar[str] = "soft-crust"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="a soft layer on firmer ground carries less than the ground",
-        source="Wong, Theory of Ground Vehicles, ch. 2",
-        kind="soil",
-        reference={"deficit": 1500.0},
-        signs={"sinkage": 1},
-        isolate="a plate or a rod pressed down through the layer; lighter loads, which stay in it",
-        family="pressure by sinkage",
-    )
-    law_terms: ClassVar[tuple[str, ...]] = ()
-    load_rises: ClassVar[bool] = True
-    gear_types: ClassVar[tuple[type, ...]] = (RigidWheel, Track)
     deficit: Annotated[Real, Parameter("Pa", 0.0, 50_000.0, "p0, pressure that is missing")] = 0.0
 
     def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
@@ -217,8 +205,18 @@ class SoftCrust(SlipLoadScaling):
 AT_WIDTH = 0.1  # Width (m) at which Reece's law and Bekker's have the same k_c and k_phi
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "reece-width",
+    text="pressure depends on sinkage over width: stiffness changes with width otherwise",
+    source="Reece 1965, Proc. Inst. Mech. Eng. 180(2A)",
+    kind="soil",
+    reference={"share": 1.0},
+    signs={},
+    varied="wheels of several widths: with one it is a change of kc and kphi",
+    varied_dimension="width",
+    isolate="the same runs with a wheel of another width; plate tests with several plates",
+    family="pressure by sinkage",
+)
 class ReeceWidth(SlipLoadScaling):
     r"""Pressure depends on sinkage over width, as Reece wrote it, and not on sinkage alone.
 
@@ -233,18 +231,6 @@ class ReeceWidth(SlipLoadScaling):
     are where n = 1.
     """
 
-    name: ClassVar[str] = "reece-width"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="pressure depends on sinkage over width: stiffness changes with width otherwise",
-        source="Reece 1965, Proc. Inst. Mech. Eng. 180(2A)",
-        kind="soil",
-        reference={"share": 1.0},
-        signs={},
-        varied="wheels of several widths: with one it is a change of kc and kphi",
-        varied_dimension="width",
-        isolate="the same runs with a wheel of another width; plate tests with several plates",
-        family="pressure by sinkage",
-    )
     law_terms: ClassVar[tuple[str, ...]] = ()
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel, Track)
     share: Annotated[Real, Parameter("1", 0.0, 2.0, "times the change from Bekker's law")] = 0.0
@@ -260,8 +246,17 @@ class ReeceWidth(SlipLoadScaling):
 LARGE = 0.5  # Diameter (m) from which the curve of a plate holds for wheels
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "small-wheel-stiffness",
+    text="the soil's stiffness depends on the diameter of the wheel",
+    source="Meirion-Griffith and Spenko 2011, J. Terramechanics 48(2)",
+    kind="soil",
+    reference={"exponent": -0.3},
+    signs={"sinkage": -1},
+    varied="wheels of several diameters: with one it is a change of kc and kphi",
+    varied_dimension="radius",
+    isolate="the same runs with a wheel of another diameter; plate tests of the soil",
+)
 class SmallWheelStiffness(SlipLoadScaling):
     r"""The pressure-sinkage curve depends on how large the wheel is.
 
@@ -273,17 +268,6 @@ class SmallWheelStiffness(SlipLoadScaling):
     change of k_c and k_phi and of nothing else.
     """
 
-    name: ClassVar[str] = "small-wheel-stiffness"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the soil's stiffness depends on the diameter of the wheel",
-        source="Meirion-Griffith and Spenko 2011, J. Terramechanics 48(2)",
-        kind="soil",
-        reference={"exponent": -0.3},
-        signs={"sinkage": -1},
-        varied="wheels of several diameters: with one it is a change of kc and kphi",
-        varied_dimension="radius",
-        isolate="the same runs with a wheel of another diameter; plate tests of the soil",
-    )
     law_terms: ClassVar[tuple[str, ...]] = ("by_load",)
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     exponent: Annotated[Real, Parameter("1", -2.0, 0.0, "m, power of the diameter")] = 0.0

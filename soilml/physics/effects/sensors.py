@@ -6,24 +6,35 @@ ones follow from those reported.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, final
+from typing import Annotated, ClassVar, TypeVar, dataclass_transform
 
 from soilml.arrays import Array, Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.contact import Force
-from soilml.physics.effects.base import Effect, EffectCard
+from soilml.physics.effects.base import Effect, effect
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import MOST_SLIP, Operating
 
+E = TypeVar("E", bound=Effect)
 
+
+@dataclass_transform(frozen_default=True, kw_only_default=True)
 def _linear_error(
-    what: str, size: float, calibration: float, signs: dict[str, int], isolate: str
-) -> EffectCard:
-    """The card of a gain or an offset."""
-    reference = {"gain" if what.endswith("scale") else "offset": size}
-    text, source = f"the {what} is off", "linear sensor error"
-    return EffectCard(text, source, "sensor", reference, signs, isolate, calibration=calibration)
+    name: str, what: str, size: float, calibration: float, signs: dict[str, int], isolate: str
+) -> Callable[[type[E]], type[E]]:
+    """Declare a gain or an offset of a sensor: an error of first order."""
+    return effect(
+        name,
+        text=f"the {what} is off",
+        source="linear sensor error",
+        kind="sensor",
+        reference={"gain" if what.endswith("scale") else "offset": size},
+        signs=signs,
+        isolate=isolate,
+        calibration=calibration,
+    )
 
 
 def signed_by_travel(value: Real, load_case: LoadCase) -> Array:
@@ -68,8 +79,14 @@ class _ChannelOffset(Effect):
         return replace(force, **{self.channel: getattr(force, self.channel) + added})
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@_linear_error(
+    "torque-offset",
+    "torque sensor's zero",
+    0.1,
+    0.05,
+    {"torque": +1},
+    "the wheel lifted; runs driven both ways",
+)
 class TorqueOffset(_ChannelOffset):
     r"""The torque sensor does not read zero when nothing turns it.
 
@@ -79,15 +96,18 @@ class TorqueOffset(_ChannelOffset):
     sensor error of first order.
     """
 
-    name, channel = "torque-offset", "torque"
-    about = _linear_error(
-        "torque sensor's zero", 0.1, 0.05, {"torque": +1}, "the wheel lifted; runs driven both ways"
-    )
+    channel = "torque"
     offset: Annotated[Real, Parameter("N m", -100.0, 100.0, "T0, reading at no torque")] = 0.0
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@_linear_error(
+    "torque-gain",
+    "torque sensor's scale",
+    0.03,
+    0.03,
+    {"torque": +1},
+    "a dead weight on a known lever",
+)
 class TorqueGain(_ChannelGain):
     r"""The torque sensor reads a share too much, or too little.
 
@@ -97,18 +117,17 @@ class TorqueGain(_ChannelGain):
     of the gears is not. References: sensor error of first order.
     """
 
-    name, channel = "torque-gain", "torque"
-    about = _linear_error(
-        "torque sensor's scale",
-        0.03,
-        0.03,
-        {"torque": +1},
-        "a dead weight on a known lever",
-    )
+    channel = "torque"
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@_linear_error(
+    "drawbar-offset",
+    "drawbar sensor's zero",
+    0.5,
+    0.5,
+    {"drawbar_pull": +1},
+    "the wheel lifted; runs both ways",
+)
 class DrawbarOffset(_ChannelOffset):
     r"""The drawbar sensor does not read zero when nothing pulls.
 
@@ -118,15 +137,18 @@ class DrawbarOffset(_ChannelOffset):
     References: sensor error of first order.
     """
 
-    name, channel = "drawbar-offset", "drawbar_pull"
-    about = _linear_error(
-        "drawbar sensor's zero", 0.5, 0.5, {"drawbar_pull": +1}, "the wheel lifted; runs both ways"
-    )
+    channel = "drawbar_pull"
     offset: Annotated[Real, Parameter("N", -200.0, 200.0, "F0, reading at no pull")] = 0.0
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@_linear_error(
+    "drawbar-gain",
+    "drawbar sensor's scale",
+    0.03,
+    0.03,
+    {},
+    "a dead weight on the drawbar over a pulley",
+)
 class DrawbarGain(_ChannelGain):
     r"""The drawbar sensor reads a share too much, or too little.
 
@@ -135,14 +157,17 @@ class DrawbarGain(_ChannelGain):
     It says nothing of a sensor that also feels the load. References: sensor error of first order.
     """
 
-    name, channel = "drawbar-gain", "drawbar_pull"
-    about = _linear_error(
-        "drawbar sensor's scale", 0.03, 0.03, {}, "a dead weight on the drawbar over a pulley"
-    )
+    channel = "drawbar_pull"
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@_linear_error(
+    "sinkage-offset",
+    "sinkage sensor's zero",
+    0.001,
+    0.0005,
+    {"sinkage": +1},
+    "the wheel on a plate at soil level",
+)
 class SinkageOffset(_ChannelOffset):
     r"""The sinkage is measured from a level that is not that of the soil.
 
@@ -152,19 +177,18 @@ class SinkageOffset(_ChannelOffset):
     sensor error of first order.
     """
 
-    name, channel = "sinkage-offset", "sinkage"
-    about = _linear_error(
-        "sinkage sensor's zero",
-        0.001,
-        0.0005,
-        {"sinkage": +1},
-        "the wheel on a plate at soil level",
-    )
+    channel = "sinkage"
     offset: Annotated[Real, Parameter("m", -0.1, 0.1, "z0, reading at no sinkage")] = 0.0
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@_linear_error(
+    "sinkage-gain",
+    "sinkage sensor's scale",
+    0.03,
+    0.03,
+    {"sinkage": +1},
+    "blocks of known height",
+)
 class SinkageGain(_ChannelGain):
     r"""The sinkage sensor reads a share too much, or too little.
 
@@ -174,18 +198,17 @@ class SinkageGain(_ChannelGain):
     proportional to its angle. References: sensor error of first order.
     """
 
-    name, channel = "sinkage-gain", "sinkage"
-    about = _linear_error(
-        "sinkage sensor's scale",
-        0.03,
-        0.03,
-        {"sinkage": +1},
-        "blocks of known height",
-    )
+    channel = "sinkage"
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@_linear_error(
+    "load-gain",
+    "load cell's scale",
+    0.03,
+    0.03,
+    {"torque": -1, "sinkage": -1},
+    "weighing the wheel on its stand",
+)
 class LoadGain(Effect):
     r"""The load cell reads a share too much: the wheel feels less than is reported.
 
@@ -195,22 +218,23 @@ class LoadGain(Effect):
     zero that is off is `offset` of load-transfer.
     """
 
-    name: ClassVar[str] = "load-gain"
-    about: ClassVar[EffectCard] = _linear_error(
-        "load cell's scale",
-        0.03,
-        0.03,
-        {"torque": -1, "sinkage": -1},
-        "weighing the wheel on its stand",
-    )
     gain: Annotated[Real, Parameter("1", -0.5, 0.5, "e, share read too much")] = 0.0
 
     def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
         return replace(at, load=at.load / (1.0 + self.gain))
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "load-hysteresis",
+    text="the load cell lags behind loads that rise and fall",
+    source="ISO 376, reversibility error",
+    kind="sensor",
+    reference={"error": 0.03},
+    signs={"torque": +1, "sinkage": +1},
+    isolate="weighing the wheel on its stand after a lighter and after a heavier load",
+    uses=("load_direction",),
+    calibration=0.01,
+)
 class LoadHysteresis(Effect):
     r"""The load cell lags: it reads too little while loads rise, too much while they fall.
 
@@ -222,17 +246,6 @@ class LoadHysteresis(Effect):
     has to fall until the cell reads the other branch is left out.
     """
 
-    name: ClassVar[str] = "load-hysteresis"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the load cell lags behind loads that rise and fall",
-        source="ISO 376, reversibility error",
-        kind="sensor",
-        reference={"error": 0.03},
-        signs={"torque": +1, "sinkage": +1},
-        isolate="weighing the wheel on its stand after a lighter and after a heavier load",
-        uses=("load_direction",),
-        calibration=0.01,
-    )
     error: Annotated[Real, Parameter("1", -0.3, 0.3, "e, half the reversibility error")] = 0.0
 
     def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
@@ -241,8 +254,16 @@ class LoadHysteresis(Effect):
         return replace(at, load=at.load / (1.0 - self.error * at.load_direction))
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "slip-offset",
+    text="the reported slip is off by a constant",
+    source="linear sensor error",
+    kind="sensor",
+    reference={"offset": 0.015},
+    signs={"torque": -1, "drawbar_pull": -1},
+    isolate="rolling the wheel unpowered on hard ground: its slip there is nil",
+    calibration=0.01,
+)
 class SlipOffset(Effect):
     r"""The reported slip is off by the same amount in all rows.
 
@@ -254,24 +275,22 @@ class SlipOffset(Effect):
     order.
     """
 
-    name: ClassVar[str] = "slip-offset"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the reported slip is off by a constant",
-        source="linear sensor error",
-        kind="sensor",
-        reference={"offset": 0.015},
-        signs={"torque": -1, "drawbar_pull": -1},
-        isolate="rolling the wheel unpowered on hard ground: its slip there is nil",
-        calibration=0.01,
-    )
     offset: Annotated[Real, Parameter("1", -0.2, 0.2, "s0, reported slip at no slip")] = 0.0
 
     def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
         return _with_slip(at, at.slip - self.offset)
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "slip-scale",
+    text="travel speed or wheel radius is off, and slip with it",
+    source="definition of slip",
+    kind="sensor",
+    reference={"error": 0.015},
+    signs={"torque": +1, "drawbar_pull": +1},
+    isolate="rolling the wheel unpowered on hard ground: its slip there is nil",
+    calibration=0.01,
+)
 class SlipScale(Effect):
     r"""Travel speed, or the wheel's radius, is known wrongly, and slip with it.
 
@@ -285,16 +304,6 @@ class SlipScale(Effect):
     per cent of speed is a large part of a small slip.
     """
 
-    name: ClassVar[str] = "slip-scale"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="travel speed or wheel radius is off, and slip with it",
-        source="definition of slip",
-        kind="sensor",
-        reference={"error": 0.015},
-        signs={"torque": +1, "drawbar_pull": +1},
-        isolate="rolling the wheel unpowered on hard ground: its slip there is nil",
-        calibration=0.01,
-    )
     error: Annotated[Real, Parameter("1", -0.2, 0.2, "e, of v / (r omega) as reported")] = 0.0
 
     def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, final
+from dataclasses import replace
+from typing import Annotated, ClassVar
 
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.contact import Stress, with_strength
-from soilml.physics.effects.base import EffectCard, SlipLoadScaling
+from soilml.physics.effects.base import SlipLoadScaling, effect
 from soilml.physics.load_case import LoadCase
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "shear-softening",
+    text="shear stress peaks and falls to a residual: dense sand, crusts",
+    source="Wong, Theory of Ground Vehicles, ch. 2; Wang et al. 2018, eq. 6",
+    kind="soil",
+    reference={"share": 0.5},
+    signs={},
+    isolate="a shear-ring test of the soil; runs from the smallest to the largest slip",
+    family="shear law",
+)
 class ShearSoftening(SlipLoadScaling):
     r"""The shear stress peaks and falls to a residual, as in dense sand.
 
@@ -29,16 +37,6 @@ class ShearSoftening(SlipLoadScaling):
     changes hardly anything that a wheel can feel.
     """
 
-    name: ClassVar[str] = "shear-softening"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="shear stress peaks and falls to a residual: dense sand, crusts",
-        source="Wong, Theory of Ground Vehicles, ch. 2; Wang et al. 2018, eq. 6",
-        kind="soil",
-        reference={"share": 0.5},
-        signs={},
-        isolate="a shear-ring test of the soil; runs from the smallest to the largest slip",
-        family="shear law",
-    )
     share: Annotated[Real, Parameter("1", 0.0, 1.0, "share of Wong's curve")] = 0.0
     residual: Annotated[Real, Parameter("1", 0.05, 1.0, "K_r, residual / peak stress")] = 0.7
     peak: Annotated[Real, Parameter("1", 0.2, 10.0, "K_w / K, where the peak is")] = 1.5
@@ -57,8 +55,16 @@ class ShearSoftening(SlipLoadScaling):
         return replace(stress, shear=stress.shear * factor)
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "hyperbolic-shear",
+    text="shear stress rises along a hyperbola and mobilises its full strength late",
+    source="Kondner 1963; Duncan and Chang 1970, ASCE 96(SM5)",
+    kind="soil",
+    reference={"share": 0.5},
+    signs={"torque": -1, "drawbar_pull": -1},
+    isolate="a shear-ring test of the soil; runs from the smallest to the largest slip",
+    family="shear law",
+)
 class HyperbolicShear(SlipLoadScaling):
     r"""The shear stress follows a hyperbola: it starts as steeply and reaches the strength later.
 
@@ -75,16 +81,6 @@ class HyperbolicShear(SlipLoadScaling):
     displacements of one wheel. Not for soils that soften.
     """
 
-    name: ClassVar[str] = "hyperbolic-shear"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="shear stress rises along a hyperbola and mobilises its full strength late",
-        source="Kondner 1963; Duncan and Chang 1970, ASCE 96(SM5)",
-        kind="soil",
-        reference={"share": 0.5},
-        signs={"torque": -1, "drawbar_pull": -1},
-        isolate="a shear-ring test of the soil; runs from the smallest to the largest slip",
-        family="shear law",
-    )
     law_terms: ClassVar[tuple[str, ...]] = ()
     load_rises: ClassVar[bool] = True
     share: Annotated[Real, Parameter("1", 0.0, 1.0, "share of the hyperbola")] = 0.0
@@ -104,8 +100,16 @@ class HyperbolicShear(SlipLoadScaling):
 AT_STRESS, SMALLEST_STRESS = 1e4, 1e-20
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "curved-envelope",
+    text="the strength envelope is curved: friction falls with the normal stress",
+    source="Charles and Watts 1980, Geotechnique 30(4); Baker 2004",
+    kind="soil",
+    reference={"exponent": 0.2},
+    signs={},
+    isolate="shear tests of the soil under a wide range of pressures; a wide range of loads",
+    family="strength envelope",
+)
 class CurvedEnvelope(SlipLoadScaling):
     r"""The envelope of strength is curved: friction falls with the normal stress.
 
@@ -122,16 +126,6 @@ class CurvedEnvelope(SlipLoadScaling):
     Where all loads press alike it is a change of c and phi.
     """
 
-    name: ClassVar[str] = "curved-envelope"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the strength envelope is curved: friction falls with the normal stress",
-        source="Charles and Watts 1980, Geotechnique 30(4); Baker 2004",
-        kind="soil",
-        reference={"exponent": 0.2},
-        signs={},
-        isolate="shear tests of the soil under a wide range of pressures; a wide range of loads",
-        family="strength envelope",
-    )
     law_terms: ClassVar[tuple[str, ...]] = ()
     load_rises: ClassVar[bool] = True
     exponent: Annotated[Real, Parameter("1", 0.0, 0.8, "a, loss of power of the stress")] = 0.0

@@ -8,14 +8,21 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Array, Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.contact import Stress, mobilised_fraction, shear_direction
-from soilml.physics.effects.base import EffectCard, SlipLoadScaling, covariate
+from soilml.physics.effects.base import SlipLoadScaling, covariate, effect
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import campaign_share
 from soilml.physics.soils import Soil
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "slip-sinkage",
+    text="a slipping wheel digs itself in: n grows with slip",
+    source="Ding et al. 2011, J. Terramechanics 48(1)",
+    kind="soil",
+    reference={"n1": 0.4},
+    signs={"sinkage": +1},
+    isolate="runs at several slips under one load, with sinkage measured",
+)
 class SlipSinkage(SlipLoadScaling):
     r"""A slipping wheel digs itself in: the exponent of sinkage grows with slip.
 
@@ -35,15 +42,6 @@ class SlipSinkage(SlipLoadScaling):
     '1.8 times as deep'
     """
 
-    name: ClassVar[str] = "slip-sinkage"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="a slipping wheel digs itself in: n grows with slip",
-        source="Ding et al. 2011, J. Terramechanics 48(1)",
-        kind="soil",
-        reference={"n1": 0.4},
-        signs={"sinkage": +1},
-        isolate="runs at several slips under one load, with sinkage measured",
-    )
     n1: Annotated[Real, Parameter("1", 0.0, 2.0, "growth of n per unit slip")] = 0.0
 
     def on_soil(self, soil: Soil, load_case: LoadCase) -> Soil:
@@ -51,8 +49,15 @@ class SlipSinkage(SlipLoadScaling):
         return replace(soil, n=soil.n + self.scaled(self.n1, load_case) * xp.abs(load_case.at.slip))
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "depth-cohesion",
+    text="cohesion grows with depth: more shear stress under deeper wheels",
+    source="Lunar Sourcebook 1991, ch. 9",
+    kind="soil",
+    reference={"c1": 2e4},
+    signs={"torque": +1, "drawbar_pull": +1, "sinkage": -1},
+    isolate="shear tests of soil taken from several depths; a wide range of loads",
+)
 class DepthCohesion(SlipLoadScaling):
     r"""The soil holds together better further down, where it is packed more densely.
 
@@ -64,15 +69,6 @@ class DepthCohesion(SlipLoadScaling):
     and no run distinguishes it from a larger friction angle.
     """
 
-    name: ClassVar[str] = "depth-cohesion"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="cohesion grows with depth: more shear stress under deeper wheels",
-        source="Lunar Sourcebook 1991, ch. 9",
-        kind="soil",
-        reference={"c1": 2e4},
-        signs={"torque": +1, "drawbar_pull": +1, "sinkage": -1},
-        isolate="shear tests of soil taken from several depths; a wide range of loads",
-    )
     c1: Annotated[Real, Parameter("Pa/m", 0.0, 1e6, "growth of cohesion with depth")] = 0.0
 
     def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
@@ -88,8 +84,16 @@ class DepthCohesion(SlipLoadScaling):
 AT_SPEED, SLOWEST = 0.05, 1e-6
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "rate",
+    text="shear strength changes with the travel speed",
+    source="Mitchell and Soga 2005, ch. 12",
+    kind="soil",
+    reference={"a": 0.05},
+    signs={},
+    isolate="the same runs at another speed, ten times slower or faster",
+    needs=("speed",),
+)
 class Rate(SlipLoadScaling):
     r"""The soil resists shear more, or less, the faster the wheel travels.
 
@@ -101,16 +105,6 @@ class Rate(SlipLoadScaling):
     is taken as that, and shear stress never turns round.
     """
 
-    name: ClassVar[str] = "rate"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="shear strength changes with the travel speed",
-        source="Mitchell and Soga 2005, ch. 12",
-        kind="soil",
-        reference={"a": 0.05},
-        signs={},
-        isolate="the same runs at another speed, ten times slower or faster",
-        needs=("speed",),
-    )
     a: Annotated[Real, Parameter("1", -0.3, 0.3, "growth per e-fold of speed")] = 0.0
 
     def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
@@ -121,8 +115,16 @@ class Rate(SlipLoadScaling):
         return replace(stress, shear=stress.shear * xp.maximum(factor, xp.zeros_like(factor)))
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "multipass",
+    text="soil in a rut is firmer than virgin soil",
+    source="Holm 1969; Senatore and Sandu 2011, J. Terramechanics 48(4)",
+    kind="soil",
+    reference={"growth": 0.5},
+    signs={"sinkage": -1},
+    isolate="the same runs again in the same rut, and on soil prepared anew",
+    needs=("pass_number",),
+)
 class Multipass(SlipLoadScaling):
     r"""A rut is firmer than virgin soil: each wheel that passed has compacted it.
 
@@ -135,16 +137,6 @@ class Multipass(SlipLoadScaling):
     shear strength remain those of virgin soil.
     """
 
-    name: ClassVar[str] = "multipass"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="soil in a rut is firmer than virgin soil",
-        source="Holm 1969; Senatore and Sandu 2011, J. Terramechanics 48(4)",
-        kind="soil",
-        reference={"growth": 0.5},
-        signs={"sinkage": -1},
-        isolate="the same runs again in the same rut, and on soil prepared anew",
-        needs=("pass_number",),
-    )
     law_terms: ClassVar[tuple[str, ...]] = ("by_load",)
     growth: Annotated[Real, Parameter("1", 0.0, 3.0, "a, power of the pass number")] = 0.0
 
@@ -171,8 +163,16 @@ class Drift(SlipLoadScaling):
         return self.scaled(change, load_case) * campaign_share(load_case.at)
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "bearing-drift",
+    text="the soil becomes firmer or softer during the campaign",
+    source="Mitchell and Soga 2005, ch. 12",
+    kind="soil",
+    reference={"growth": 0.2},
+    signs={"sinkage": -1},
+    isolate="the first run again at the end of the campaign",
+    uses=("progress",),
+)
 class BearingDrift(Drift):
     r"""The soil becomes firmer, or softer, during the campaign.
 
@@ -183,16 +183,6 @@ class BearingDrift(Drift):
     prepared anew before each run does not drift; whoever prepares it may.
     """
 
-    name: ClassVar[str] = "bearing-drift"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the soil becomes firmer or softer during the campaign",
-        source="Mitchell and Soga 2005, ch. 12",
-        kind="soil",
-        reference={"growth": 0.2},
-        signs={"sinkage": -1},
-        isolate="the first run again at the end of the campaign",
-        uses=("progress",),
-    )
     growth: Annotated[Real, Parameter("1", -2.0, 2.0, "a, growth of ln k in the campaign")] = 0.0
 
     def on_soil(self, soil: Soil, load_case: LoadCase) -> Soil:
@@ -201,8 +191,16 @@ class BearingDrift(Drift):
         return replace(soil, kc=soil.kc * firmer, kphi=soil.kphi * firmer)
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "cohesion-drift",
+    text="the soil gains or loses cohesion during the campaign: drying, wetting",
+    source="Fredlund et al. 1978, Can. Geotech. J. 15(3)",
+    kind="soil",
+    reference={"gain": 500.0},
+    signs={"torque": +1, "drawbar_pull": +1},
+    isolate="the first run again at the end of the campaign; the moisture of the soil",
+    uses=("progress",),
+)
 class CohesionDrift(Drift):
     r"""The soil gains or loses cohesion during the campaign, as it dries or is wetted.
 
@@ -213,16 +211,6 @@ class CohesionDrift(Drift):
     that dries; the straight line is ours. Friction and stiffness stay.
     """
 
-    name: ClassVar[str] = "cohesion-drift"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the soil gains or loses cohesion during the campaign: drying, wetting",
-        source="Fredlund et al. 1978, Can. Geotech. J. 15(3)",
-        kind="soil",
-        reference={"gain": 500.0},
-        signs={"torque": +1, "drawbar_pull": +1},
-        isolate="the first run again at the end of the campaign; the moisture of the soil",
-        uses=("progress",),
-    )
     gain: Annotated[Real, Parameter("Pa", -1e4, 1e4, "c_1, gained in the campaign")] = 0.0
 
     def on_soil(self, soil: Soil, load_case: LoadCase) -> Soil:
@@ -230,8 +218,16 @@ class CohesionDrift(Drift):
         return replace(soil, cohesion=namespace(cohesion).maximum(cohesion, 0.0 * cohesion))
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "friction-drift",
+    text="the friction angle grows or falls during the campaign: compaction, loosening",
+    source="Bolton 1986, Geotechnique 36(1)",
+    kind="soil",
+    reference={"gain": 0.05},
+    signs={"torque": +1, "drawbar_pull": +1},
+    isolate="the first run again at the end of the campaign; the density of the soil",
+    uses=("progress",),
+)
 class FrictionDrift(Drift):
     r"""The friction angle grows or falls during the campaign, as the soil is compacted or loosened.
 
@@ -241,16 +237,6 @@ class FrictionDrift(Drift):
     grows with its relative density; that it does so evenly is ours. Cohesion and stiffness stay.
     """
 
-    name: ClassVar[str] = "friction-drift"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="the friction angle grows or falls during the campaign: compaction, loosening",
-        source="Bolton 1986, Geotechnique 36(1)",
-        kind="soil",
-        reference={"gain": 0.05},
-        signs={"torque": +1, "drawbar_pull": +1},
-        isolate="the first run again at the end of the campaign; the density of the soil",
-        uses=("progress",),
-    )
     gain: Annotated[Real, Parameter("rad", -0.3, 0.3, "phi_1, gained in the campaign")] = 0.0
 
     def on_soil(self, soil: Soil, load_case: LoadCase) -> Soil:

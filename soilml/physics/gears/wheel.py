@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
-from soilml.numerics.quadrature import columns, crowded_ends, crowded_start, sine_and_versine
+from soilml.numerics.quadrature import columns, crowded_ends, crowded_start
 from soilml.physics.contact import SMALLEST_DEPTH, Contact, Resolution
 from soilml.physics.gears.flat_rim import flat_rim_contact, flat_rim_points
 from soilml.physics.gears.rigid_wheel import (
@@ -111,128 +111,40 @@ class Wheel(RigidWheel):
 def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) -> Contact:
     """Two parts, before and behind the maximum stress, nodes crowded where stress vanishes.
 
-    The first part is measured from the entry backward, the second from the exit forward. All sines
-    and cosines follow from those of the distances to these ends, and of these ends themselves.
+    The pressure behind the maximum mirrors that before it, at the same fractions of both parts.
     """
     xp = namespace(rim.entry)
-    nodes = crowded_start(count)
-    x, weight = columns(nodes, rim.entry)
+    x, weight = columns(crowded_start(count), rim.entry)
     front, rear = rim.entry - rim.peak, rim.peak - rim.exit
-    length = xp.stack([front, rear], axis=0)
-    sine, versine = sine_and_versine(nodes, length)  # (2, count, batch)
-    sin_entry, cos_entry = xp.sin(rim.entry), xp.cos(rim.entry)
-    sin_exit, cos_exit = xp.sin(rim.exit), xp.cos(rim.exit)
-    arc, none = front + rear, 0.0 * front
-    shear_radius = rim.shear_radius + none
-    # sin(entry) - sin(exit), without loss of digits
-    whole = 2.0 * xp.sin(0.5 * arc) * xp.cos(0.5 * (rim.entry + rim.exit))
-    of_parts = [
-        (shear_radius * front, -shear_radius * rear),
-        (none, shear_radius * arc),
-        (sin_entry, sin_exit),
-        (cos_entry, -cos_exit),
-        (none, whole),
-        (sin_entry, -sin_exit),
-        (cos_entry, cos_exit),
-    ]
-    stacked = xp.stack([value for both in of_parts for value in both], axis=0)
-    rate, start, sin_end, along, sin_start, across, cos_end = (
-        stacked[2 * i : 2 * i + 2, ...][:, None, :] for i in range(len(of_parts))
-    )
-    surface_travel = x * rate
-    surface_travel += start
-    # difference from the sine of the entry angle
-    sin_difference = versine * sin_end
-    sin_difference += sine * along
-    sin_difference += sin_start
-    # the pressure behind the maximum mirrors that before it, at the same fractions of both parts
-    cos_difference = sine[0, ...] * sin_entry
-    cos_difference -= versine[0, ...] * cos_entry
-    cosine = sine * across
-    cosine -= versine * cos_end
-    cosine += cos_end
-
-    def points(value: Array) -> Array:
-        return xp.reshape(value, (2 * count, -1))
-
-    travelled = rim.travelled(at.slip, law)
-    displacement = points(surface_travel - (shear_radius * travelled) * sin_difference)
-    area = weight * (rim.radius * rim.width * length)[:, None, :]
-    depth = rim.radius * cos_difference
-    return Contact(
-        depth=xp.concat([depth, depth], axis=0),
-        shear_displacement=displacement,
-        surface_travel=points(surface_travel),
-        area=points(area),
-        horizontal_area=points(area * cosine),
-        frontal_area=points(area * (sin_entry - sin_difference)),
-        shear_lever_arm=rim.lever,
-        width=rim.width,
-        shear_direction=displacement_direction(displacement, at.slip, law),
-        travel_ratio=travelled,
-        geometry=rim,
-        repeats=2,
-    )
+    before = x * front
+    depth = depth_at(rim, before)
+    passed = xp.concat([before, (front + rear) - x * rear], axis=0)
+    arc = xp.concat([weight * front, weight * rear], axis=0)
+    found = contact_at(rim, at, passed, xp.concat([depth, depth], axis=0), arc, law)
+    return replace(found, repeats=2)
 
 
 def _braking_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) -> Contact:
     """Parts that end where shear displacement changes its direction and the shear curve bends.
 
-    Each part is measured backward from its front end. The pressure behind the maximum is that at an
-    angle before it, which is measured forward from the angle of the part's front end.
+    Points are measured backward from the entry. The pressure behind the maximum is that at the
+    mirrored angle before it.
     """
     xp = namespace(rim.entry)
-    nodes = crowded_ends(count)
-    x, weight = columns(nodes, rim.entry)
-    front, rear = rim.entry - rim.peak, rim.peak - rim.exit
-    travelled = rim.travelled(at.slip, law)
-    ends = xp.stack(_braking_part_ends(rim, 1.0 - travelled), axis=0)
-    low, high = ends[:-1, :], ends[1:, :]  # (parts, batch)
-    length, ratio = high - low, front / rear
-    behind = high <= rim.peak
-    begin = xp.where(behind, rim.entry - (high - rim.exit) * ratio, high)
-    sine, versine = sine_and_versine(nodes, length)
-    sin_high, cos_high = xp.sin(high), xp.cos(high)
-    half = 0.5 * (rim.entry - high)
-    sin_start = 2.0 * xp.sin(half) * xp.cos(rim.entry - half)
-    passed = x * length[:, None, :]
-    passed += (rim.entry - high)[:, None, :]
-    sin_difference = versine * sin_high[:, None, :]
-    sin_difference += sine * cos_high[:, None, :]
-    sin_difference += sin_start[:, None, :]
-    cosine = sine * sin_high[:, None, :]
-    cosine -= versine * cos_high[:, None, :]
-    cosine += cos_high[:, None, :]
-    # depth, from the difference of its cosine from that of the entry angle
-    sine, versine = sine_and_versine(nodes, xp.where(behind, length * ratio, length))
-    half = 0.5 * (rim.entry - begin)
-    cos_start = 2.0 * xp.sin(half) * xp.sin(rim.entry - half)
-    sin_begin = xp.sin(begin)
-    depth = sine * xp.where(behind, -sin_begin, sin_begin)[:, None, :]
-    depth -= versine * xp.cos(begin)[:, None, :]
-    depth += cos_start[:, None, :]
-    depth *= rim.radius
+    x, weight = columns(crowded_ends(count), rim.entry)
+    ends = xp.stack(_braking_part_ends(rim, 1.0 - rim.travelled(at.slip, law)), axis=0)
+    low, length = ends[:-1, None, :], (ends[1:, :] - ends[:-1, :])[:, None, :]  # (parts, 1, batch)
+    mirrored = (low - rim.exit + (1.0 - x) * length) * (
+        (rim.entry - rim.peak) / (rim.peak - rim.exit)
+    )
+    passed = rim.entry - (low + length) + x * length
+    depth = depth_at(rim, xp.where(low < rim.peak, mirrored, passed))
 
     def points(value: Array) -> Array:
         return xp.reshape(value, (length.shape[0] * count, -1))
 
-    displacement = passed - travelled * sin_difference
-    displacement *= rim.shear_radius
-    displacement = points(displacement)
-    area = weight * (rim.radius * rim.width * length)[:, None, :]
-    return Contact(
-        depth=xp.maximum(points(depth), xp.full_like(points(depth), SMALLEST_DEPTH)),
-        shear_displacement=displacement,
-        surface_travel=points(rim.shear_radius * passed),
-        area=points(area),
-        horizontal_area=points(area * cosine),
-        frontal_area=points(area * (xp.sin(rim.entry) - sin_difference)),
-        shear_lever_arm=rim.lever,
-        width=rim.width,
-        shear_direction=displacement_direction(displacement, at.slip, law),
-        travel_ratio=travelled,
-        geometry=rim,
-    )
+    depth = points(xp.maximum(depth, xp.full_like(depth, SMALLEST_DEPTH)))
+    return contact_at(rim, at, points(passed), depth, points(weight * length), law)
 
 
 def _braking_part_ends(rim: WheelArc, slip: Array) -> list[Array]:

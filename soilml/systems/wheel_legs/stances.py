@@ -38,7 +38,6 @@ class SpringLeg:
     turning: Annotated[Real, Parameter("rad/s", 1e-3, 100.0, "omega, of the motor")] = 0.3
     legs: Annotated[Real, Parameter("1", 3.0, 12.0, "legs of the wheel-leg")] = 5.0
     softening: Annotated[Real, Parameter("m", 0.0, 1.0, "sliding over which friction drops")] = 0.0
-    healing: Annotated[Real, Parameter("1", 0.0, 1.0, "share of the drop regained at rest")] = 1.0
 
 
 @dataclass(frozen=True)
@@ -66,8 +65,7 @@ def simulate_stance(
     The foot sticks while F_E = F_S sin(beta) + Q cos(beta) <= N tan(phi_S) and slides against
     N tan(phi_D), phi_D = phi_S - `increment`, until it is at rest again (rad). With `softening` d
     the coefficient of friction decays to tan(phi_D) by exp(-s / d) over the distance s slid since
-    the foot last broke loose. With `healing` below 1 a foot that came to rest breaks loose at that
-    share of the drop above tan(phi_D). The source has d = 0 and full healing. References: Comin
+    the foot last broke loose. The source has d = 0. References: Comin
     and Saaj 2017, eqs. 20-23, in which Q is missing and the effect of slip is not printed. Here the
     hub advances by x_H = (1 - i) l sin(omega t), l the length under load (their eq. 11), while the
     motor turns the leg at omega: a sticking foot makes the leg lag and bends it by Q. Without
@@ -102,12 +100,11 @@ def _integrate(
     A foot that comes to rest within a step stops there, and sticks or reverses at the next one.
     """
     check(leg)
-    slip, static, gap, k, length, M, m, kappa, zeta, omega, legs, soften, heal = (
+    slip, static, gap, k, length, M, m, kappa, zeta, omega, legs, soften = (
         np.array(v, dtype=np.float64)
         for v in np.broadcast_arrays(
             slip, friction_angle, increment, leg.stiffness, leg.length, leg.hub_mass,
             leg.foot_mass, leg.bending, leg.damping, leg.turning, leg.legs, leg.softening,
-            leg.healing,
         )
     )  # fmt: skip
     inside = (slip >= 0.0) & (slip <= 1.0) & (gap >= 0.0) & (static >= gap) & (static <= 1.4)
@@ -141,8 +138,7 @@ def _integrate(
     half = 0.5 * dt
     z, w, x, v = loaded_length, np.zeros_like(k), np.zeros_like(k), np.zeros_like(k)
     heading = np.zeros_like(k)  # direction of sliding of the foot, 0 where it sticks
-    slid, mu_top = np.zeros_like(k), mu_s  # since it broke loose, and where it did
-    mu_healed = np.where(heal < 1.0, mu_d + heal * (mu_s - mu_d), mu_s)
+    slid = np.zeros_like(k)  # since it broke loose
     gradual = bool((soften > 0.0).any())
     decay = 1.0 / np.maximum(soften, 1e-9)  # of friction, 1/m; at once where nothing is given
     for step in range(count + 1):
@@ -150,11 +146,11 @@ def _integrate(
         normal, push = forces(t, z, w, x, v)
         a = normal / M - GRAVITY
         yield t, a, -x, normal
-        breaks = (heading == 0.0) & (np.abs(push) > mu_top * normal)
+        breaks = (heading == 0.0) & (np.abs(push) > mu_s * normal)
         heading = np.where(breaks, -np.sign(push), heading)
         slides = heading != 0.0
         slid = np.where(breaks, 0.0, slid)
-        mu = mu_d + (mu_top - mu_d) * np.exp(-decay * slid) if gradual else mu_d
+        mu = mu_d + (mu_s - mu_d) * np.exp(-decay * slid) if gradual else mu_d
         c = np.where(slides, (-heading * mu * normal - push) / m, 0.0)
         normal, push = forces(t + half, z + half * w, w + half * a, x + half * v, v + half * c)
         a = normal / M - GRAVITY
@@ -166,5 +162,4 @@ def _integrate(
         v, before = np.where(stops, 0.0, after), v
         moved = dt * share * 0.5 * (before + v)
         x, slid = x + moved, slid + np.abs(moved)
-        mu_top = np.where(stops, mu_healed, mu_top)
         heading = np.where(stops, 0.0, heading)

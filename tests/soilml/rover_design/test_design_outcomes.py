@@ -30,7 +30,8 @@ def without_errors(worlds):
     return replace(
         worlds,
         errors={name: 0.0 * values for name, values in worlds.errors.items()},
-        effect=np.full(worlds.count, ""),
+        lacking=(),
+        acts=np.zeros((worlds.count, 0), bool),
         weights=0.0 * worlds.weights,
         lug_shearing=np.full(worlds.count, 0.75),
     )

@@ -8,9 +8,11 @@ import pytest
 
 from soilml import Estimator, Model, Operating, Wheel, read_case, soil, soil_map
 from soilml.cli import main
+from soilml.config.explanations import CaseExplanation
 from soilml.errors import InputError
 from soilml.io.text_tables import csv_text
-from soilml.soil_maps.field import FieldSetting, SoilField
+from soilml.physics.effects import StressShift
+from soilml.soil_maps.field import FieldSetting, SoilField, map_ability
 from soilml.soil_maps.local_soils import LocalSoils
 from soilml.soil_maps.raster import MapGrid, geotiff, nav2_files, read_elevation
 
@@ -122,6 +124,23 @@ def test_the_weak_soil_is_climbed_with_less_probability_and_more_slip(found):
     # level ground takes less slip and work than a slope
     assert np.all(ability.climbed[:, 0] >= ability.climbed[:, 1])
     assert np.nanmax(ability.energy[:, 0]) < np.nanmin(ability.energy[:, 1])
+
+
+def test_slopes_have_each_explanation_as_likely_as_it_is(found, rover):
+    alone, n = read_case(rover), 3
+    shift = replace(alone, model=alone.model + StressShift(shift=0.5))
+    both = tuple(CaseExplanation.of(0.5, one) for one in (alone, shift))
+    score, covariance = np.zeros((n, 3)), np.tile(0.1 * np.eye(3), (n, 1, 1))
+    slope = np.deg2rad([12.0])
+    climbed = {
+        name: map_ability(case, found.soils, score, covariance, slope).climbed.mean()
+        for name, case in {
+            "alone": alone, "shift": shift, "both": replace(alone, explanations=both)
+        }.items()
+    }  # fmt: skip
+    assert abs(climbed["alone"] - climbed["shift"]) > 0.2
+    half = 0.5 * (climbed["alone"] + climbed["shift"])
+    assert climbed["both"] == pytest.approx(half, abs=0.05)
 
 
 @pytest.mark.parametrize("as_read", [False, True])

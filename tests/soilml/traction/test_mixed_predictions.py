@@ -54,7 +54,8 @@ def test_each_explanation_has_the_share_of_its_weight_in_the_draws(drawn):
 def test_the_error_fades_to_zero_mean_and_a_usual_size_in_every_direction(drawn):
     slip = np.asarray([0.3, 0.3, 0.3, 0.95])
     load = np.asarray([60.0, 4.0, 900.0, 60.0])
-    error, before = drawn.errors(slip, load.tolist(), ("drawbar_pull",))
+    found = drawn.with_errors(slip, load.tolist(), ("drawbar_pull",))
+    error, before = (draws.errors for draws in found)
     draw = np.arange(len(drawn.draws.values))
     at = [error.at("drawbar_pull", "", draw, np.full(draw.size, s), np.full(draw.size, w))
           for s, w in zip(slip, load, strict=True)]  # fmt: skip

@@ -8,7 +8,8 @@ from soilml import DrawbarOffset, LoadTransfer, Operating, SlipSinkage, read_cas
 from soilml.config.case import Case
 from soilml.remarks import texts
 from soilml.traction import SoilDraws, predict_traction, quantile_band
-from soilml.traction.pull_and_slope import MeasuredRange, predictions_by_load
+from soilml.traction.measured_range import MeasuredRange
+from soilml.traction.pull_and_slope import predictions_by_load
 
 SLIPS = np.asarray([0.1, 0.3, 0.6])
 EVERYWHERE = MeasuredRange((0.0, 0.99), (1.0, 1e4))

@@ -100,7 +100,7 @@ def test_bands_of_a_rover_have_the_error_of_its_model(case):
     for wide in (learned, declared):
         found = rover_report(wide, table, slopes=SLOPES, exact_model=True)
         assert not remarked(found.warnings, "not errors of the model")
-        assert remarked(found.warnings, "errors of the model (torque)")
+        assert remarked(found.warnings, "errors of the model (torque")
         torque, exact = (f.performance.torque["front-left"][:, 0] for f in (found, plain))
         # the wheel carries 68.7 N, two lengths beyond the learned range: a usual error, 0.3 N m
         assert np.std(torque) == pytest.approx(np.hypot(0.3, np.std(exact)), rel=0.15)

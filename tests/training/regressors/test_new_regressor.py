@@ -23,9 +23,6 @@ class MeanRegressor(GaussianRegressor):
         self.zeros_ = np.zeros((x.shape[1], z.shape[1]))
 
     def _standardised_outputs(self, x):
-        return x @ self.zeros_, x @ self.zeros_
-
-    def _add_standardised_outputs(self, x):
         zero = x @ self.zeros_
         return zero, zero
 

@@ -51,7 +51,7 @@ def model_columns(posterior, readings, size) -> np.ndarray:
     rows = add_residual_rows(posterior.family, posterior.response, inputs)
     basis = monomials(SOIL, posterior.response.terms)
     columns = rows.columns_at(constant(graph, basis[:, None]))
-    columns.node("Transpose").node("Compress", rows.used, axis=0).named("out")
+    columns.node("Compress", rows.used, axis=0).named("out")
     shapes = {key: posterior.inputs[key] for key in inputs}
     session = session_of(graph.model(shapes, {"out": (1, ["m", "columns"])}))
     noise = {"torque_std": 0.01 * readings["torque"], "sinkage_std": 0.01 * readings["sinkage"]}
@@ -65,9 +65,9 @@ def model_columns(posterior, readings, size) -> np.ndarray:
         np.full(len(SLIP), 0.01),
         0.5 / readings["load"],
     ]
-    std = np.hypot(stds, posterior.response.error[:, None]).reshape(-1, 1)
+    std = np.hypot(stds, posterior.response.error[:, None]).T.reshape(-1, 1)
     own = (system * std)[:, -len(MODEL_ERROR_COLUMNS) :]
-    return own.reshape(3, len(SLIP), -1)
+    return own.reshape(len(SLIP), 3, -1).swapaxes(0, 1)
 
 
 def posterior_slope(posterior, readings) -> np.ndarray:

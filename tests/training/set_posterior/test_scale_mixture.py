@@ -20,7 +20,8 @@ TERMS, ERRORS, ROWS, POINTS = 5, len(MODEL_ERROR_COLUMNS), 14, 6
 def session():
     graph = Graph()
     inputs = {name: Value(graph, name) for name in ("system", "size", "basis")}
-    system, errors = inputs["system"].last_columns(ERRORS)
+    whole = inputs["system"].node("Unsqueeze", inputs["system"].indices([0]))
+    system, errors = whole.last_columns(ERRORS)
     mixture = scale_mixture(system, errors, inputs["size"], USUAL_SCALES, (True,) * ERRORS)
     found = mixture.misfit(inputs["basis"], constant(graph, [1.0]))
     (found.log_likelihood * -2.0).named("surprise")
@@ -70,11 +71,11 @@ def test_common_errors_are_integrated_out_of_the_likelihood():
     rng = np.random.default_rng(0)
     a, g, b = rng.normal(size=(8, 5)), rng.normal(size=(8, 3)), rng.normal(size=5)
     graph = Graph()
-    integrate_out(Value(graph, "system"), 3).node("Identity").named("out")
-    session = session_of(graph.model({"system": ["m", 8]}, {"out": (1, ["m", 5])}))
+    integrate_out(Value(graph, "system"), 3)[0].node("Identity").named("out")
+    session = session_of(graph.model({"system": [1, "m", 8]}, {"out": (1, [1, "m", 5])}))
     system = np.concatenate([a, g], axis=1).astype(np.float32)
-    found = session.run(None, {"system": system})[0] @ b
+    found = session.run(None, {"system": system[None]})[0][0] @ b
     dense = np.linalg.solve(np.eye(8) + g @ g.T, a @ b)
     assert found @ found == pytest.approx((a @ b) @ dense, rel=1e-5)
     steady = np.concatenate([a, 0.0 * g], axis=1).astype(np.float32)
-    assert session.run(None, {"system": steady})[0] == pytest.approx(a, abs=1e-6)
+    assert session.run(None, {"system": steady[None]})[0][0] == pytest.approx(a, abs=1e-6)
