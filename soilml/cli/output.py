@@ -97,7 +97,10 @@ def save_columns(columns: Mapping[str, Any], path: Path) -> None:
 
 
 def tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
-    """Say how many rows were written to `out`; without one, print them as table or CSV."""
+    """Say how many rows were written to `out`; without one, print them.
+
+    A table begins with the status where one is not `ok`, and is without it otherwise.
+    """
     if out is not None:
         count = len(next(iter(columns.values())))
         tell(f"{count} row{'' if count == 1 else 's'} written to {out}")
@@ -106,9 +109,14 @@ def tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
         for text in csv_blocks(columns):
             write_stdout(text)
         return
-    content = {name: np.asarray(values).tolist() for name, values in columns.items()}
-    table = ReportTable.of("rows", columns).text
-    write_stdout(f"{table()}\n" if SCREEN.form == "table" else json_text(content))
+    if SCREEN.form == "json":
+        content = {name: np.asarray(values).tolist() for name, values in columns.items()}
+        write_stdout(json_text(content))
+        return
+    status = {"status": columns["status"]} if "status" in columns else {}
+    first = status if any(v != "ok" for v in status.get("status", ())) else {}
+    others = {name: values for name, values in columns.items() if name != "status"}
+    write_stdout(f"{ReportTable.of('rows', first | others).text()}\n")
 
 
 def show_result(report: Report, content: Mapping[str, Any]) -> None:
