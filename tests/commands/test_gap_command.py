@@ -123,11 +123,11 @@ def test_gap_json_has_the_promised_keys(done):
     found = content(done)
     assert {
         "status", "effects", "cause_set", "where", "gap", "soil_before", "soil_after",
-        "mimic_radius", "next_runs", "seed", "soilml_version",
+        "outside_probability", "next_runs", "seed", "soilml_version",
     } <= set(found)  # fmt: skip
     assert found["status"] == "named" and ["slip-sinkage"] in found["cause_set"]
     (effect,) = found["effects"]
-    assert {"name", "parameters", "alternatives", "separating_snr"} <= set(effect)
+    assert {"name", "parameters", "alternatives", "probability"} <= set(effect)
     assert set(effect["parameters"]["n1"]) == {"value", "std", "unit"}
     assert {"channel", "slip", "load_N", "z", "p"} <= set(found["where"][0])
     assert len(found["where"][0]["slip"]) == len(found["where"][0]["load_N"]) == 2

@@ -111,8 +111,7 @@ def _tables(args: argparse.Namespace) -> tuple[Table | None, Table | None, list[
 
     Raises the error of the first table where none can be used.
     """
-    from soilml.identification.bevameter.plate_tests import read_plate_tests
-    from soilml.identification.bevameter.shear_tests import read_shear_tests
+    from soilml.identification.bevameter.tables import read_plate_tests, read_shear_tests
     from soilml.remarks import Remark
 
     found: dict[str, list[Table]] = {}

@@ -93,7 +93,7 @@ def test_held_out_runs_change_no_fit(dug):
     torque = np.where(back, 1.7, 1.0) * table["torque_Nm"]
     changed = replace(table, columns=table.columns | {"torque_Nm": torque})
     other = gap(case, changed, effects=FEW, holdout="run", seed=3)
-    assert other.candidates == report.candidates and other.soil_before == report.soil_before
+    assert other.probabilities == report.probabilities and other.soil_before == report.soil_before
     assert other.variance_components == report.variance_components
     assert other.remainder_probability == report.remainder_probability
 
