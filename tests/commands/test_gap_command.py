@@ -207,7 +207,7 @@ def test_an_effect_of_ones_own_is_hidden_found_and_written(inputs, tmp_path, cap
     true = tmp_path / "true.toml"
     true.write_text(MODEL + '[[effect]]\nname = "cable-drag"\ndrag = 40.0\n')
     command = ["simulate", str(true), "--slip", "0.08:0.6:8", "--load", "40,60,90,140"]
-    assert main([*command, "--effects", str(own)]) == 0
+    assert main([*command, "--effects", str(own), "--format", "csv"]) == 0
     runs = tmp_path / "runs.csv"
     runs.write_text(noisy(csv.DictReader(io.StringIO(capsys.readouterr().out))))
     files = (str(inputs / "model.toml"), str(runs), "--effects", str(own))

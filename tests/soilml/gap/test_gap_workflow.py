@@ -155,8 +155,8 @@ def model(dug, tmp_path_factory):
 def test_the_updated_model_can_be_identified_and_simulated(model, capsys):
     file = str(model / "model.toml")
     assert main(["identify", file, str(model / "runs.csv")]) == 0
-    assert main(["simulate", file, "--slip", "0.1,0.5", "--load", "60"]) == 0
-    assert "ok" in capsys.readouterr().out
+    assert main(["simulate", file, "--slip", "0.1,0.5", "--load", "60", "--format", "csv"]) == 0
+    assert ",ok" in capsys.readouterr().out
 
 
 def test_the_updated_model_makes_a_recipe(model, capsys):
