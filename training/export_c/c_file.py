@@ -100,7 +100,7 @@ def write_c(
     single = single_function(model, shared) if interface.single else None
     sets = set_functions(model, interface, shared, rows) if interface.sets else None
     functions = [single] if single else []
-    functions += [sets.row, sets.set, sets.soil, sets.answer] if sets else []
+    functions += [sets.row, sets.set, sets.once, sets.soil, sets.answer] if sets else []
     arrays = {
         name: (kind, max(f.lengths.get(kind, 0) for f in functions))
         for kind, name in ARRAYS.items()
