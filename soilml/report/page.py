@@ -131,16 +131,8 @@ def page(report: Report, origin: Provenance) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["with_code"] = _with_code
     template = environment.get_template("report.html.j2")
     return template.render(page=page_content(report), origin=origin)
-
-
-def _with_code(text: str) -> str:
-    """A text in HTML, with what stands between backticks as code."""
-    from markupsafe import Markup, escape
-
-    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def report_entry(report: Report, origin: Provenance) -> dict[str, Any]:
