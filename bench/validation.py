@@ -89,7 +89,7 @@ def sets_table() -> str:
     """Files beside the exact posterior: RMSE over all sizes, log density, coverage."""
     ratios = lines_of("sets", "file, sets", "rows", "refused")
     gaps = {x["file, sets"]: x for x in lines_of("sets", "gap, nat") if x["subset"] == "all"}
-    covered = {x["file, sets"]: x for x in lines_of("sets", "joint") if x["subset"] == "all"}
+    covered = {x["file, sets"]: x for x in lines_of("sets", "subset", "c") if x["subset"] == "all"}
     rows = []
     for name in dict.fromkeys(line["file, sets"] for line in ratios):
         if name not in covered:
