@@ -7,8 +7,8 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from described_rigs import Truth
 from foreign_rigs import RADIUS
+from rig_tables import Truth
 
 from soilml.errors import SoilmlError
 from soilml.log_import import init_map

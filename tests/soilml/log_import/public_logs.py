@@ -4,8 +4,8 @@ Samples are those of `drive`; nothing of the sources but the names of their colu
 """
 
 import numpy as np
-from described_rigs import RPM, Truth, write
 from foreign_rigs import RADIUS, drive, noisy, way
+from rig_tables import RPM, Truth, write
 
 
 def steps(rng, **more):

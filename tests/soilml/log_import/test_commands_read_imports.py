@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from described_rigs import write
 from foreign_rigs import RADIUS, law
+from rig_tables import write
 
 from soilml.cli import main
 

@@ -4,8 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from described_rigs import drive
-from foreign_rigs import table
+from foreign_rigs import drive, table
 from guessed_channels import is_marked
 
 from soilml.log_import import import_log, init_map

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from described_rigs import drive, noisy, write
-from foreign_rigs import RADIUS
+from foreign_rigs import RADIUS, drive, noisy
 from guessed_channels import LOOKED_AT, RIGHT, SILENT, is_marked, judged_rigs
+from rig_tables import write
 
 from soilml.cli import main
 from soilml.optional_imports import tomllib

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from described_rigs import six_axes_load_on_y
+from described_rigs import WRITERS
 
 from soilml.errors import InputError
 from soilml.log_import import import_log, init_map
@@ -34,7 +34,7 @@ def edited(text, old, new):
 @pytest.fixture(scope="module")
 def on_its_side(tmp_path_factory):
     """The logs of a rig whose sensor lies on its side, and their guessed map."""
-    logs, _ = six_axes_load_on_y(np.random.default_rng(5), tmp_path_factory.mktemp("rig"))
+    logs, _ = WRITERS[0](np.random.default_rng(5), tmp_path_factory.mktemp("rig"))
     return logs, init_map(logs)
 
 
