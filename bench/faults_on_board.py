@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from functools import cache
 from typing import Any
 
 import numpy as np
-from board import estimator_of
 from faults import (
     LOAD,
     SLIP,
@@ -20,7 +18,7 @@ from faults import (
     shuffled_conditions,
     simulate,
 )
-from runner import ROOT, Bench, Row, Sample, each, percent, table
+from runner import ROOT, Bench, Row, Sample, percent, table
 from wrong_worlds import World
 from wrong_worlds import simulate as simulate_world
 
@@ -43,8 +41,6 @@ WORLDS = (
 CHANNELS = ("slip", "load", "torque", "sinkage", "drawbar_pull")
 #: Flags of a set, as columns.
 FLAGS = ("answer", "detector", "detector, exact sensors")
-TIMED, QUICK_TIMED = 300, 10  # Calls of which the least time is taken, in turn
-FILES = ("wheel", "any_wheel")
 EXACT_SENSORS, USUAL_SENSORS = "no fault, exact sensors", "no fault, usual sensor errors"
 ABOUT = (
     f"`wheel.onnx` as flown, on {SETS} soils a line, {ROWS} rows each: sets flagged by the answer, "
@@ -127,41 +123,6 @@ def tables(rows: list[Row]) -> str:
     return table(rows, {"fault": "fault", "channels": "channels"}, columns)
 
 
-def cost_cases(sample: Sample) -> list[Row]:
-    """Each file."""
-    return [{"file": name, "calls": QUICK_TIMED if sample.quick else TIMED} for name in FILES]
-
-
-def cost(case: Row) -> Row:
-    """Least times (ms) of a call without and with the detector, measured in turn."""
-    estimator, times = estimator_of(case["file"]), np.zeros((case["calls"], 2))
-    sets, rng = estimator.sets, np.random.default_rng(SEED)
-    assert sets is not None
-    slip, load = rng.uniform(0.08, 0.5, ROWS), rng.uniform(45.0, 105.0, ROWS)
-    rows = {"slip": slip, "load": load, "torque": 0.06 * load * (1.0 - np.exp(-slip / 0.15))}
-    for i in range(len(times)):
-        start = time.perf_counter()
-        sets.update(estimator.session, sets.rows(rows), estimator.start())
-        middle = time.perf_counter()
-        estimator.run(**rows)
-        times[i] = middle - start, time.perf_counter() - middle
-    without, both = 1e3 * times.min(axis=0)
-    return {"without": without, "both": both, "ratio": both / without}
-
-
 FAULTS_ON_BOARD = Bench(
     "faults-on-board", "Faults that a file flags as flown", ABOUT, cases, flagged, tables
-)
-DETECTOR_COST = Bench(
-    "detector-cost",
-    "Time of the fault detector",
-    f"A set of {ROWS} rows: least time of {TIMED} calls, without the detector and with it.",
-    cost_cases,
-    cost,
-    lambda rows: table(
-        rows,
-        {"file": "file"},
-        {"without, ms": each("without"), "with, ms": each("both"), "ratio": each("ratio")},
-    ),
-    timed=True,
 )

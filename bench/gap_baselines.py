@@ -1,4 +1,4 @@
-"""What others would do: regressions on residuals, for names and for predictions."""
+"""What others would do: Gaussian processes of the readings, with the soil alone and without it."""
 
 from __future__ import annotations
 
@@ -9,70 +9,10 @@ from typing import Any
 import numpy as np
 
 from soilml.config.case import Case
-from soilml.fitting.coordinates import select_free
-from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.operating_points import operating_points
-from soilml.fitting.predictions import forces, linearise, predict
-from soilml.fitting.readings import stack_readings
+from soilml.fitting.predictions import forces
 from soilml.io.table import Table
-from soilml.physics.effects import EFFECTS
 from soilml.quantities import CHANNELS, column
-
-
-def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
-    """The effect that each baseline names, '' where it sees no gap."""
-    readings = stack_readings(case, table)
-    effects = {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}
-    known, _ = effect_signatures(soil_only, readings, effects)
-    y = predict(soil_only, [], np.zeros((1, 0)), readings)[0]
-    r = (readings.measured - y) / readings.std
-    g = np.stack([s.column for s in known], axis=1) / readings.std[:, None]
-    labels = [s.name for s in known]
-    free = select_free(case, None)
-    at = np.asarray([f.prior.fraction(float(soil_only.parameters()[f.path][1])) for f in free])
-    j = linearise(case, free, at, readings).jacobian / readings.std[:, None]
-    return {
-        "residual correlation": _correlated(g, r, labels),
-        "Lasso, BIC": _largest(lasso_weights(g, r), g, labels),
-        "stepwise, BIC": _stepwise(g, r, j, labels, float(np.log(r.size))),
-    }
-
-
-def _correlated(g: np.ndarray, r: np.ndarray, labels: list[str]) -> str:
-    correlation = [abs(np.corrcoef(column_, r)[0, 1]) for column_ in g.T]
-    return labels[int(np.nanargmax(correlation))]
-
-
-def _largest(weights: np.ndarray, g: np.ndarray, labels: list[str]) -> str:
-    share = np.abs(weights) * np.linalg.norm(g, axis=0)
-    return labels[int(np.argmax(share))] if share.max() > 0 else ""
-
-
-def lasso_weights(signatures: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Weights (k,) of signatures (m, k) of residuals (m,) in noise, by the Lasso with BIC."""
-    from sklearn.linear_model import LassoLarsIC
-
-    norm = np.maximum(np.linalg.norm(signatures, axis=0), 1e-12)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of steps that rounding makes too small
-        fitted = LassoLarsIC(criterion="bic", noise_variance=1.0).fit(signatures / norm, residual)
-    return np.asarray(fitted.coef_ / norm)
-
-
-def _stepwise(
-    g: np.ndarray, r: np.ndarray, j: np.ndarray, labels: list[str], penalty: float
-) -> str:
-    """The first effect that a joint regression of soil and effects takes in."""
-
-    def left(columns: np.ndarray) -> float:
-        weights = np.linalg.lstsq(columns, r, rcond=None)[0]
-        return float(np.sum((r - columns @ weights) ** 2))
-
-    base = left(j)
-    costs = [left(np.column_stack([j, column_])) + penalty for column_ in g.T]
-    best = int(np.argmin(costs))
-    return labels[best] if costs[best] < base else ""
-
 
 #: Columns that a process uses where they vary.
 COVARIATES = ("speed_m_s", "pass", "slip_angle_rad", "time_s")
@@ -101,52 +41,30 @@ def gaussian_process(dimensions: int) -> Any:
     return GaussianProcessRegressor(kernel + WhiteKernel(1.0), random_state=0)
 
 
-#: Regressions of the residuals of a soil-only fit; the others are of the readings themselves.
-BESIDE_SOIL = ("Gaussian process", "quadratic")
+def process_of(
+    case: Case, learned: Table, rows: Sequence[Table], base: dict[str, Any] | None = None
+) -> list[dict[str, np.ndarray]]:
+    """What a process of each measured channel predicts for other rows (k,), by part and channel.
 
-
-def learned(
-    case: Case,
-    table: Table,
-    plain: dict[str, np.ndarray],
-    parts: Sequence[Table],
-    measured: Sequence[str],
-) -> dict[str, list[dict[str, np.ndarray]]]:
-    """What regressions on slip, load and covariates predict for other rows, by label and part.
-
-    Those of `BESIDE_SOIL` are of the residuals of a soil-only fit, whose predictions at the rows of
-    the table are `plain`; what they predict is to be added to the soil's. The others know no
-    physics.
+    base: Predictions (rows,) whose residuals it is of; by default the mean of the readings, which
+        it then adds.
     """
-    from sklearn.ensemble import GradientBoostingRegressor
-    from sklearn.linear_model import Ridge
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import PolynomialFeatures
-
-    features = process_features(table)
-    x = features(table)
-
-    def process() -> Any:
-        return gaussian_process(x.shape[1])
-
-    makers: dict[str, Callable[[], Any]] = {
-        "Gaussian process": process,
-        "quadratic": lambda: make_pipeline(PolynomialFeatures(2), Ridge(1e-3)),
-        "process of readings": process,
-        "ridge": lambda: make_pipeline(PolynomialFeatures(2), Ridge(1e-3)),
-        "boosted trees": lambda: GradientBoostingRegressor(random_state=0, min_samples_leaf=3),
-    }
-    found: dict[str, list[dict[str, np.ndarray]]] = {label: [{} for _ in parts] for label in makers}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        for name in measured:
-            scale = float(np.median(case.noise[column(name)].std(table[column(name)])))
-            for label, make in makers.items():
-                base = plain[name] if label in BESIDE_SOIL else np.mean(table[column(name)])
-                model = make().fit(x, (table[column(name)] - base) / scale)
-                for part, rows in zip(found[label], parts, strict=True):
-                    added = model.predict(features(rows)) * scale
-                    part[name] = added if label in BESIDE_SOIL else added + base
+    features = process_features(learned)
+    found: list[dict[str, np.ndarray]] = [{} for _ in rows]
+    for name in CHANNELS:
+        reading = learned[column(name)]
+        known = np.isfinite(reading)
+        if not known.any():
+            continue
+        scale = float(np.median(case.noise[column(name)].std(reading[known])))
+        middle = float(np.mean(reading[known]))
+        off = (reading - (middle if base is None else base[name])) / scale
+        process = gaussian_process(features(learned).shape[1])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            process.fit(features(learned)[known], off[known])
+        for part, at in zip(found, rows, strict=True):
+            part[name] = scale * process.predict(features(at)) + (middle if base is None else 0.0)
     return found
 
 
@@ -158,17 +76,7 @@ def predicted(case: Case, rows: Table) -> dict[str, np.ndarray]:
 
 def process_of_readings(case: Case, learned: Table, rows: Table) -> dict[str, np.ndarray]:
     """Predictions of a Gaussian process of the readings, by slip, load and gear."""
-    names = [name for name in ("slip", "load_N", "gear") if name in learned]
-    features, found = process_features(Table({name: learned[name] for name in names})), {}
-    for name in CHANNELS:
-        known = np.isfinite(learned[column(name)])
-        if not known.any():
-            continue
-        reading = learned[column(name)][known]
-        scale = float(np.median(case.noise[column(name)].std(reading)))
-        process = gaussian_process(features(learned).shape[1])
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            process.fit(features(learned)[known], (reading - reading.mean()) / scale)
-        found[name] = reading.mean() + scale * process.predict(features(rows))
-    return found
+    names = [n for n in ("slip", "load_N", "gear", *map(column, CHANNELS)) if n in learned]
+    blank = {column(n): np.full(len(learned), np.nan) for n in CHANNELS}
+    plain = Table(blank | {name: learned[name] for name in names})
+    return process_of(case, plain, [rows])[0]

@@ -40,8 +40,6 @@ QUICK_SEED, QUICK_EVERY = 1, 20
 #: Draws of the plans of few rows and of one load beside the first one, by numbers from that of the
 #: seed times 100: one draw of few rows has six or seven with a cause that can be named.
 FURTHER_DRAWS = (1, 2)
-#: The other methods are run on one set in so many.
-OTHERS_EVERY = 8
 #: The covariate of effects that follow the order of the rows.
 ORDER = "progress"
 #: Causes of another law than the catalogue's that effects name rightly. Both the layer and the firm
@@ -57,19 +55,16 @@ SAME_CAUSE = {
 
 
 def cases(sample: Sample) -> list[Row]:
-    """Plans of the sample, numbered, and those beside it that enlarge groups of few sets."""
+    """Plans of the sample, and those beside it that enlarge groups of few sets."""
     if sample.quick:
         plans = [p for s in sample.seeds or (QUICK_SEED,) for p in benchmark_plans(s)]
-        return [asdict(p) | {"number": i} for i, p in enumerate(thinned(plans, QUICK_EVERY))]
+        return [asdict(p) for p in thinned(plans, QUICK_EVERY)]
     seeds = sample.of(SEEDS)
     drawn = [benchmark_plans(seed) for seed in seeds]
     chosen = [plan for plans in drawn for plan in thinned(plans, EVERY)]
     every = [*(plan for plans in drawn for plan in plans), *further_plans(seeds)]
-    found = [asdict(plan) | {"number": i} for i, plan in enumerate(chosen)]
-    return found + [  # 1: without other methods
-        asdict(plan) | {"number": 1, "added_to": group}
-        for plan, group in added(every, chosen, LEAST)
-    ]
+    more = added(every, chosen, LEAST)
+    return [*map(asdict, chosen), *(asdict(plan) | {"added_to": group} for plan, group in more)]
 
 
 def belongs(plan: Plan, group: str) -> bool:
@@ -147,7 +142,7 @@ def judged(asked: Row) -> Row:
     report = analysis.result
     record |= {"seconds": analysis.seconds, "solves": analysis.solves} | _said(report)
     if report.soil_before:
-        record |= _compared(asked["number"], case, report, table, drawn)
+        record |= _compared(case, report, table, drawn)
     return record
 
 
@@ -176,8 +171,8 @@ def _said(report: GapReport) -> Row:
     }
 
 
-def _compared(number: int, case: Case, report: GapReport, table: Table, drawn: BlindSet) -> Row:
-    """Soil and held-out rows beside the truth, and the other methods on some sets."""
+def _compared(case: Case, report: GapReport, table: Table, drawn: BlindSet) -> Row:
+    """Soil and held-out rows beside the truth, and what processes predict for these rows."""
     soil = drawn.truth["soil"]
     measured = tuple(n for n in CHANNELS if np.isfinite(table[column(n)]).any())
     soil_only = case.with_values({k: v.value for k, v in report.soil_before.items()})
@@ -193,25 +188,19 @@ def _compared(number: int, case: Case, report: GapReport, table: Table, drawn: B
             if name in report.soil_before
         }
     }
-    models = {"soil": soil_only, "named": report.model}
-    plain_design = len(measured) == len(CHANNELS) and "gear" not in table
-    if number % OTHERS_EVERY == 0 and plain_design:
-        compared["naming"] = gap_baselines.names(soil_only, table, case)
     parts = {"region": drawn.region, "between": drawn.between}
     rows = [
         Table(dict(columns) | {ORDER: np.asarray(drawn.truth[f"{part}_elapsed"])})
         for part, columns in parts.items()
     ]
-    learned = gap_baselines.learned(case, table, predicted(soil_only, table), rows, measured)
+    own = gap_baselines.process_of(case, table, rows)
+    beside = gap_baselines.process_of(case, table, rows, predicted(soil_only, table))
     for i, (part, at) in enumerate(zip(parts, rows, strict=True)):
+        y = {"soil": predicted(soil_only, at), "named": predicted(report.model, at)}
+        y["process of readings"] = own[i]
+        y["Gaussian process"] = {n: y["soil"][n] + beside[i][n] for n in measured}
         target = drawn.truth[f"{part}_true"]
-        y = {label: predicted(model, at) for label, model in models.items()}
-        for label, values in learned.items():
-            added = values[i]
-            if label in gap_baselines.BESIDE_SOIL:
-                added = {name: y["soil"][name] + added[name] for name in measured}
-            y[label] = added
-        compared[part] = {label: distance(case, own, target, measured) for label, own in y.items()}
+        compared[part] = {label: distance(case, of, target, measured) for label, of in y.items()}
     return compared
 
 

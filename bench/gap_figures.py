@@ -129,11 +129,6 @@ def falsely_unique(s: Judged) -> bool:
     return unique(s) and not right(s)
 
 
-def claiming(s: Judged) -> bool:
-    """Whether an explanation is stated, alone or in a class."""
-    return s["status"] in (*UNIQUE_STATUSES, "class")
-
-
 def suspected(most: int) -> Callable[[Judged], bool]:
     """Whether the truth is among so many first suspects, or claimed explanations without them."""
     return lambda s: s["truth"] in (s.get("suspects") or s.get("cause_set") or ())[:most]
@@ -194,7 +189,7 @@ def figures(every: Sequence[Judged]) -> list[Figure]:
         *_naming(usual, sampled(every, SMALL, LARGE)),
         *_false_names(usual),
         *_silence(usual),
-        *_suspects(usual, sampled(every, ONE_LOAD)),
+        *_suspects(sampled(every, ONE_LOAD)),
         *_families(sets),
         *_few_rows(sampled(every, FEW_ROWS)),
         *_torque_alone(sets),
@@ -215,8 +210,6 @@ def _naming(sets: Sequence[Judged], enlarged: Sequence[Judged]) -> Iterator[Figu
         yield share(name, part, holds, goal)
     alone = [s for s in sets if unique(s)]
     yield share("right when unique, all tiers", alone, right, ">= 0.95")
-    known = [s for s in alone if s["catalogued"]]
-    yield share("right when unique, cause in the catalogue", known, right)
 
 
 def _false_names(sets: Sequence[Judged]) -> Iterator[Figure]:
@@ -229,8 +222,6 @@ def _false_names(sets: Sequence[Judged]) -> Iterator[Figure]:
         ("cause outside the catalogue", [s for s in sets if s["tier"] == "C"]),
     ):
         yield share(f"falsely unique: {name}", own, falsely_unique, "<= 0.05")
-    for name, own in (("null", null), ("scatter", scatter)):
-        yield share(f"an effect stated, alone or in a class: {name}", own, claiming)
 
 
 def _silence(sets: Sequence[Judged]) -> Iterator[Figure]:
@@ -241,18 +232,13 @@ def _silence(sets: Sequence[Judged]) -> Iterator[Figure]:
     yield share("analysis ended by an error", sets, lambda s: s["status"] == "crash", "<= 0.0")
 
 
-def _suspects(sets: Sequence[Judged], enlarged: Sequence[Judged]) -> Iterator[Figure]:
-    """Of the sample with what was added at one load, and of the sample."""
-
-    def at_one_load(given: Sequence[Judged], asked: Callable[[Judged], bool]) -> list[Judged]:
-        own = (s for s in given if s["design"] in SUSPECT_DESIGNS and not own_figures(s))
-        return [s for s in own if s["catalogued"] and asked(s)]
-
+def _suspects(sets: Sequence[Judged]) -> Iterator[Figure]:
+    """Of the sample with what was added at one load."""
+    own = (s for s in sets if s["design"] in SUSPECT_DESIGNS and not own_figures(s))
+    one_load = [s for s in own if s["catalogued"] and nameable(s)]
     for most, place, goal in ((1, "first", ">= 0.75"), (3, "in the first three", ">= 0.95")):
         name = f"one load, SNR >= 3: truth {place} among suspects"
-        yield share(name, at_one_load(enlarged, nameable), suspected(most), goal)
-        name = f"one load, signature of 6 sigma: truth {place}"
-        yield share(name, at_one_load(sets, visible), suspected(most))
+        yield share(name, one_load, suspected(most), goal)
 
 
 def _families(sets: Sequence[Judged]) -> Iterator[Figure]:
@@ -268,11 +254,10 @@ def _families(sets: Sequence[Judged]) -> Iterator[Figure]:
 
 def _few_rows(sets: Sequence[Judged]) -> Iterator[Figure]:
     few = [s for s in sets if s["design"] == FEW_ROWS and s["catalogued"]]
-    own, plain = [s for s in few if nameable(s)], [s for s in sampled(few) if visible(s)]
+    own = [s for s in few if nameable(s)]
     for most, place, goal in ((1, "first", ">= 0.70"), (3, "in the first three", ">= 0.90")):
         name = f"5 to 10 rows at one load, SNR >= 3: truth {place}"
         yield share(name, own, suspected(most), goal)
-        yield share(f"5 to 10 rows, signature of 6 sigma: truth {place}", plain, suspected(most))
 
 
 def _torque_alone(sets: Sequence[Judged]) -> Iterator[Figure]:
@@ -283,20 +268,8 @@ def _torque_alone(sets: Sequence[Judged]) -> Iterator[Figure]:
 
 
 def _probabilities(sets: Sequence[Judged]) -> Iterator[Figure]:
-    stated, true = gap_reliability.statements(sets)
-    start = "stated probabilities"
-    for name, bins, gate in (
-        ("bins of 50", gap_reliability.equal_bins(stated, true), ""),
-        ("wide bins", gap_reliability.wide_bins(stated, true), "<= 0.05"),
-    ):
-        worst, (usual, seldom) = gap_reliability.largest(bins), gap_reliability.chance(bins)
-        text = f"{worst:.3f}; by chance alone {usual:.3f} (95 %: {seldom:.3f})"
-        yield number(f"{start}, largest deviation, {name}", worst, text, gate)
-    as_much = gap_reliability.chance_of_as_much(stated, true)
-    name = f"{start}, share of exact ones that deviate as much in all wide bins"
-    yield number(name, as_much, f"{as_much:.3f}", ">= 0.05")
     found, (low, high), (usual, seldom) = gap_reliability.calibration_error(sets)
-    name = f"{start} from {gap_reliability.NOTABLE:g}, expected calibration error"
+    name = f"stated probabilities from {gap_reliability.NOTABLE:g}, expected calibration error"
     text = f"{found:.3f} ({low:.3f}-{high:.3f}); by chance alone {usual:.3f} (95 %: {seldom:.3f})"
     yield number(name, found, text, "<= 0.05")
 

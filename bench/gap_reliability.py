@@ -10,10 +10,10 @@ import numpy as np
 
 Judged = dict[str, Any]
 
-#: Statements in a bin.
+#: Statements in a bin, at least.
 BIN = 50
-#: Edges of the wide bins; neighbours are joined until each has `BIN` statements.
-WIDE_EDGES = (0.0, 0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.98, 1.0)
+#: Edges of the bins; neighbours are joined until each has `BIN` statements.
+EDGES = (0.0, 0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.98, 1.0)
 #: Simulations of an analyst whose probabilities are exact, and draws of the sets with replacement.
 SIMULATIONS = 400
 #: Stated probability from which a statement is one that a user acts on.
@@ -28,115 +28,53 @@ class Bin:
     frequency: float
     count: int
 
-    @property
-    def deviation(self) -> float:
-        """Distance between what was stated and what happened."""
-        return abs(self.stated - self.frequency)
-
 
 def statements(sets: Sequence[Judged]) -> tuple[np.ndarray, np.ndarray]:
     """(n,) stated probabilities, ascending, and (n,) whether the effect was hidden in that set."""
-    stated, true = _pairs(sets)
-    order = np.argsort(stated, kind="stable")
-    return stated[order], true[order]
-
-
-def _pairs(sets: Sequence[Judged]) -> tuple[np.ndarray, np.ndarray]:
-    """The same in the order of the sets."""
     pairs = [
         (p, name in s["truth"] or (s["tier"] in ("T", "C") and name in s.get("relatives", ())))
         for s in sets
         for name, p in s.get("probabilities", {}).items()
     ]
     stated = np.asarray([p for p, _ in pairs], dtype=np.float64)
-    return stated, np.asarray([true for _, true in pairs], dtype=bool)
+    order = np.argsort(stated, kind="stable")
+    return stated[order], np.asarray([true for _, true in pairs], dtype=bool)[order]
 
 
-def equal_bins(stated: np.ndarray, true: np.ndarray) -> list[Bin]:
-    """Bins of `BIN` neighbouring statements, the last one of more."""
-    count = len(stated) // BIN
-    if count == 0:
-        return []
-    cuts = [*range(BIN, count * BIN, BIN)]
-    return [_bin(p, t) for p, t in zip(np.split(stated, cuts), np.split(true, cuts), strict=True)]
-
-
-def wide_bins(stated: np.ndarray, true: np.ndarray) -> list[Bin]:
-    """Bins between `WIDE_EDGES`, joined with the next until each has `BIN` statements."""
-    cuts = _wide_cuts(stated)
+def bins_of(stated: np.ndarray, true: np.ndarray) -> list[Bin]:
+    """Bins between `EDGES`, joined with the next until each has `BIN` statements."""
+    cuts = _cuts(stated)
     if cuts is None:
         return []
-    return [_bin(p, t) for p, t in zip(np.split(stated, cuts), np.split(true, cuts), strict=True)]
+    parts = zip(np.split(stated, cuts), np.split(true, cuts), strict=True)
+    return [Bin(float(p.mean()), float(t.mean()), len(p)) for p, t in parts]
 
 
-def _wide_cuts(stated: np.ndarray) -> list[int] | None:
-    """Where the wide bins of ascending probabilities begin, but the first; None for too few."""
+def _cuts(stated: np.ndarray) -> list[int] | None:
+    """Where the bins of ascending probabilities begin, but the first; None for too few."""
     if len(stated) < BIN:
         return None
     cuts, last = [], 0
-    for cut in np.searchsorted(stated, WIDE_EDGES[1:-1], side="right"):
+    for cut in np.searchsorted(stated, EDGES[1:-1], side="right"):
         if cut - last >= BIN and len(stated) - cut >= BIN:
             cuts.append(int(cut))
             last = int(cut)
     return cuts
 
 
-def largest(bins: Sequence[Bin]) -> float:
-    """The largest deviation of any bin; NaN without bins."""
-    return max((b.deviation for b in bins), default=float("nan"))
-
-
-def chance(bins: Sequence[Bin]) -> tuple[float, float]:
-    """Median and 95 % quantile of the largest deviation if all probabilities were exact."""
-    if not bins:
-        return float("nan"), float("nan")
-    generator = np.random.default_rng(0)
-    stated = np.asarray([b.stated for b in bins])
-    count = np.asarray([b.count for b in bins])
-    drawn = generator.binomial(count, stated, (SIMULATIONS, len(bins))) / count
-    worst = np.abs(drawn - stated).max(axis=1)
-    return float(np.median(worst)), float(np.quantile(worst, 0.95))
-
-
-def chance_of_as_much(stated: np.ndarray, true: np.ndarray) -> float:
-    r"""Share of analysts with exact probabilities whose wide bins deviate as much, in all.
-
-    .. math:: \sum_b \frac{(O_b - \sum p)^2}{\sum p (1 - p)}
-
-    with O_b effects that were hidden in bin b. The effects of one set exclude each other for the
-    most part, so that independent ones deviate a little more. NaN without bins.
-
-    References: Hosmer and Lemeshow, Communications in Statistics A9(10), 1980.
-    """
-    cuts = _wide_cuts(stated)
-    if cuts is None:
-        return float("nan")
-    first = [0, *cuts]
-    expected = np.add.reduceat(stated, first)
-    variance = np.add.reduceat(stated * (1.0 - stated), first)
-
-    def deviation(hidden: np.ndarray) -> float:
-        found = np.add.reduceat(hidden.astype(np.float64), first)
-        return float(np.sum((found - expected) ** 2 / np.maximum(variance, 1e-9)))
-
-    generator, own = np.random.default_rng(0), deviation(true)
-    drawn = [deviation(generator.random(len(stated)) < stated) for _ in range(SIMULATIONS)]
-    return float(np.mean([value >= own for value in drawn]))
-
-
 def calibration_error(
     sets: Sequence[Judged],
 ) -> tuple[float, tuple[float, float], tuple[float, float]]:
-    """Expected calibration error of statements from `NOTABLE` on, in their wide bins.
+    """Expected calibration error of statements from `NOTABLE` on, in their bins.
 
     The mean of |stated - frequency| over these statements; its 95 % interval over sets that are
     drawn with replacement; and its median and 95 % quantile for exact probabilities.
     """
-    pairs = [_pairs([s]) for s in sets]
+    pairs = [statements([s]) for s in sets]
     own = [(p[p >= NOTABLE], t[p >= NOTABLE]) for p, t in pairs if np.any(p >= NOTABLE)]
     stated, true = statements(sets)
     stated, true = stated[stated >= NOTABLE], true[stated >= NOTABLE]
-    cuts = _wide_cuts(stated)
+    cuts = _cuts(stated)
     if cuts is None:
         return float("nan"), (float("nan"),) * 2, (float("nan"),) * 2
     edges = stated[cuts]
@@ -155,7 +93,3 @@ def calibration_error(
     low, high = np.quantile(again, (0.025, 0.975))
     usual, seldom = np.quantile(exact, (0.5, 0.95))
     return error(stated, true), (float(low), float(high)), (float(usual), float(seldom))
-
-
-def _bin(stated: np.ndarray, true: np.ndarray) -> Bin:
-    return Bin(float(stated.mean()), float(true.mean()), len(stated))

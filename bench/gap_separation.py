@@ -12,10 +12,10 @@ from soilml.fitting.coordinates import select_free
 from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings, stack_readings
+from soilml.gap.scores import SignatureSimilarity
 from soilml.inference.constants import SCATTER_UNITS
 from soilml.inference.gaussian_terms import scatter_columns
 from soilml.io.table import Table
-from soilml.numerics.subspaces import project_out
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import column
 
@@ -65,8 +65,10 @@ def separation(case: Case, table: Table, truth: dict[str, Any]) -> Separation:
     found = []
     for name in causes:
         others = [white[other][:, None] for other in causes if other != name]
+        rivals = {n: white[n] for n in columns if n not in causes}
         space = np.hstack([white_soil, *others])
-        found.append(_separated(name, white, space, [n for n in columns if n not in causes]))
+        similar = SignatureSimilarity.beside(space, {name: white[name]} | rivals)
+        found.append(Separation(float(similar.norm[0]), *similar.separation(name, 1.0)))
     return min(found, key=lambda s: s.snr)
 
 
@@ -112,18 +114,3 @@ def _covariance(case: Case, truth: dict[str, Any], readings: Readings) -> np.nda
         same = readings.channel[:, None] == readings.channel
         covariance += same * np.outer(std, std) * np.exp(-0.5 * distance)
     return np.asarray(covariance)
-
-
-def _separated(
-    name: str, white: dict[str, np.ndarray], space: np.ndarray, rivals: list[str]
-) -> Separation:
-    own = project_out(white[name][:, None], space)[:, 0]
-    signal = float(np.linalg.norm(own))
-    cosines = {}
-    for rival in rivals:
-        other = project_out(white[rival][:, None], space)[:, 0]
-        both = signal * float(np.linalg.norm(other))
-        cosines[rival] = abs(float(own @ other)) / both if both > 0.0 else 0.0
-    nearest = max(cosines, key=lambda n: cosines[n], default="")
-    cosine = min(cosines.get(nearest, 0.0), 1.0)
-    return Separation(signal, signal * float(np.sqrt(1.0 - cosine**2)), nearest)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -65,10 +64,7 @@ METHODS = {
     "soil": "soil alone",
     "named": "returned model",
     "Gaussian process": "soil + process",
-    "quadratic": "soil + quadratic ridge",
     "process of readings": "process alone",
-    "ridge": "quadratic ridge",
-    "boosted trees": "boosted trees",
 }
 PARTS = {
     "between": "Rows of the same runs at other slips",
@@ -80,8 +76,7 @@ def tables(every: Sequence[Judged]) -> str:
     """All sections."""
     sets = gf.sampled(every)
     parts = [_head(every, sets), _gates(every), _statuses(sets), _held_out(sets), _families(sets)]
-    parts += [_reliability(sets), _naming(sets), _snr(sets), _causes(sets)]
-    return "\n\n".join(part for part in (*parts, _designs(sets)) if part)
+    return "\n\n".join(part for part in (*parts, _reliability(sets)) if part)
 
 
 def _head(every: Sequence[Judged], sets: Sequence[Judged]) -> str:
@@ -103,11 +98,6 @@ def _gates(sets: Sequence[Judged]) -> str:
         "suspects, all others by their cause set.\n\n"
         + markdown(("figure", "measured", "gate", "met"), rows, 4)
     )
-
-
-def rates(*judge):  # type: ignore[no-untyped-def]
-    """Statistics: the rate of each judgement."""
-    return [lambda own, of=of: rate(sum(map(of, own)), len(own)) for of in judge]
 
 
 def of_unique(own: Sequence[Judged]) -> str:
@@ -138,7 +128,10 @@ def _by_level(sets: Sequence[Judged]) -> list[Judged]:
 
 def _statuses(sets: Sequence[Judged]) -> str:
     own = _by_level([s for s in gf.named_designs(sets) if nameable(s)])
-    (contains,) = rates(holds)
+
+    def contains(of: Sequence[Judged]) -> str:
+        return rate(sum(map(holds, of)), len(of))
+
     columns = {"cause set contains the cause": contains, "right when unique": of_unique}
     alone = _by_level([s for s in sets if s["tier"] == "D"])
     return "\n\n".join(
@@ -169,8 +162,8 @@ def _held_out(sets: Sequence[Judged]) -> str:
             parts.append(f"{words}:\n\n{table(own, {'status': 'said'}, columns, 'all')}")
     head = (
         "## Held-out rows, whatever was said\n\nRMS distance to the noise-free readings, in "
-        "standard deviations of the noise: median over the sets of a status. *Soil + ...* are "
-        "regressions of what the soil alone leaves; the last three know no physics."
+        "standard deviations of the noise: median over the sets of a status. *Soil + process* is a "
+        "Gaussian process of what the soil alone leaves; *process alone* knows no physics."
     )
     return "\n\n".join([head, *parts]) if parts else ""
 
@@ -198,7 +191,7 @@ def _families(sets: Sequence[Judged]) -> str:
 
 def _reliability(sets: Sequence[Judged]) -> str:
     stated, true = gap_reliability.statements(sets)
-    bins = gap_reliability.wide_bins(stated, true)
+    bins = gap_reliability.bins_of(stated, true)
     if not bins:
         return ""
     rows = [
@@ -212,72 +205,8 @@ def _reliability(sets: Sequence[Judged]) -> str:
     return (
         "## Reliability of stated probabilities\n\n"
         f"{len(stated)} statements, one for each effect that a set could test. A statement is true "
-        "if the effect was hidden in that set. A bin of 50 statements deviates by more than 0.05 "
-        "by chance alone: its figure has no gate. Two figures judge all wide bins together.\n\n"
+        "if the effect was hidden in that set.\n\n"
         + markdown(("stated, mean", "hidden", "difference"), rows, 3)
-    )
-
-
-def _naming(sets: Sequence[Judged]) -> str:
-    """Names by other methods, side by side, on the sets that all of them analysed."""
-    own = [s for s in sets if "naming" in s]
-    single = [s for s in own if s["catalogued"] and len(s["truth"]) == 1]
-    null = [s for s in own if gf.bare(s)]
-    if not own:
-        return ""
-    alarms = sum(s["status"] != "no-gap" for s in null)
-    ours = rate(sum(map(first, single)), len(single)), rate(alarms, len(null))
-    rows = [("this workflow", *ours)]
-    for label in own[0]["naming"]:
-        hits = sum([s["naming"].get(label)] == s["truth"] for s in single)
-        false = sum(s["naming"].get(label, "") != "" for s in null)
-        rows.append((label, rate(hits, len(single)), rate(false, len(null))))
-    return (
-        "## Names, side by side\n\nThe first name is the truth (one hidden effect of the "
-        "catalogue), and false alarms (tiers N).\n\n"
-        + markdown(("method", "first name right", "false alarms"), rows, 3)
-    )
-
-
-def _snr(sets: Sequence[Judged]) -> str:
-    own = [s for s in gf.named_designs(sets) if s["catalogued"]]
-    edges = [0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, np.inf]
-    rows = []
-    for low, high in itertools.pairwise(edges):
-        part = [s for s in own if low <= s["snr"] < high]
-        found = [of(part) for of in rates(first, holds)]
-        rows.append((f"{low:g} to {high:g}", *found, size_of_set(part)))
-    head = ("separating SNR", "first is the truth", "cause set contains it", "mean size of the set")
-    return "## Naming against separating SNR\n\n" + markdown(head, rows, 4)
-
-
-def _causes(sets: Sequence[Judged]) -> str:
-    own = [s for s in gf.named_designs(sets) if nameable(s)]
-    own = sorted((s | {"hidden": "+".join(s["truth"])} for s in own), key=lambda s: s["hidden"])
-    total, wrong = Counter(s["hidden"] for s in own), Counter()
-    for s in own:
-        if not holds(s):
-            said = "+".join(s["cause_set"][0]) if s.get("cause_set") else f"`{s['status']}`"
-            wrong[s["hidden"], said] += 1
-    cells = sorted(wrong.items(), key=lambda c: (-c[1], c[1] / total[c[0][0]], c[0][0]))
-    rows = [(t, said, f"{k}/{total[t]}") for (t, said), k in cells[:12]]
-    contains, named = rates(holds, first)
-    columns = {"cause set contains it": contains, "first": named, "right when unique": of_unique}
-    return (
-        "## Weakest cells of the confusion matrix\n\nTruth outside the cause set, separating SNR "
-        f"of 3 or more.\n\n{markdown(('truth', 'said instead', 'sets'), rows, 3)}\n\n"
-        f"## By cause\n\n{table(own, {'truth': 'hidden'}, columns)}"
-    )
-
-
-def _designs(sets: Sequence[Judged]) -> str:
-    ordered = [s for name in DESIGNS for s in sets if s["design"] == name]
-    null = [s for s in ordered if gf.bare(s) or s["tier"] == "D"]
-    return (
-        "## What was said, by design\n\nWith a cause of the catalogue:\n\n"
-        + _counts([s for s in ordered if s["catalogued"]], "design", "design")
-        + "\n\nWith nothing hidden, or a discrepancy alone:\n\n"
-        + _counts(null, "design", "design")
     )
 
 
@@ -286,20 +215,17 @@ def draw(sets: Sequence[Judged], file: Path) -> None:
     from matplotlib.figure import Figure
 
     stated, true = gap_reliability.statements(gf.sampled(sets))
-    small = gap_reliability.equal_bins(stated, true)
-    wide = gap_reliability.wide_bins(stated, true)
+    wide = gap_reliability.bins_of(stated, true)
     if not wide:
         return
     figure = Figure(figsize=(5.0, 4.6), layout="constrained")
     axes = figure.subplots()
     axes.plot([0, 1], [0, 1], color="0.6", lw=1.0, zorder=0)
-    dots = [b.stated for b in small], [b.frequency for b in small]
-    axes.scatter(*dots, s=10, color="0.7", label="50 each")
     x, y = np.asarray([[b.stated, b.frequency] for b in wide]).T
     ends = [gf.interval(round(b.frequency * b.count), b.count) for b in wide]
     low, high = np.asarray(ends).T
     span = [np.maximum(y - low, 0.0), np.maximum(high - y, 0.0)]
-    axes.errorbar(x, y, span, fmt="o", ms=5, color="C0", label="wide bins, 95 % interval")
+    axes.errorbar(x, y, span, fmt="o", ms=5, color="C0", label="95 % interval")
     axes.set(xlabel="stated probability of an effect", ylabel="share in which it was hidden")
     axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
     axes.legend(frameon=False, loc="upper left")

@@ -18,9 +18,9 @@ from training.export.one_step import one_step_graph
 ROOT = Path(__file__).parents[1]
 RELEASED = sorted((ROOT / "exported").glob("*.onnx"))
 SETS = ("wheel", "kls1_wheel", "any_wheel", "wheel_small", "any_wheel_small")
-HOSTILE = (np.nan, np.inf, -np.inf, 0.0, -1.0, 1e-38, -1e-38, 1e38, -1e38, 3e38, 1e9, -1e9, 1e-20)
+HOSTILE = (np.nan, np.inf, -np.inf, 0.0, -1.0, 1e-38, 3e38, -1e38, 1e9)
 #: Random calls of each file, with hostile numbers in several inputs at once.
-MIXTURES = 100
+MIXTURES = 60
 #: Files of which a quick test has the graph of another kind.
 ALIKE = ("kls1_wheel", "wheel_small", "any_wheel_small", "wheel_mlp", "slip_torque_known",
          "slip_vibration_known", "slip_torque_paper", "slip_vibration_paper")  # fmt: skip

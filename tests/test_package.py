@@ -73,7 +73,7 @@ def test_a_bare_install_brings_numpy_and_onnxruntime_alone(board, tmp_path):
     done = run(board / "python", "-m", "pip", "list", "--format=freeze", cwd=tmp_path)
     installed = {line.split("==")[0].lower() for line in done.stdout.splitlines()}
     assert {"soilml", "numpy", "onnxruntime"} <= installed
-    for ground in ("scipy", "torch", "scikit-learn", "pyarrow", "matplotlib", "onnx", "rich"):
+    for ground in ("scipy", "torch", "scikit-learn", "pyarrow", "matplotlib", "onnx"):
         assert ground not in installed
 
 

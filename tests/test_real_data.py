@@ -36,7 +36,7 @@ def test_identification_says_what_five_points_at_one_load_can_tell(capsys):
 
 def test_estimates_of_five_points_at_one_load_stay_with_the_prior(capsys):
     model = str(ROOT / "exported/kls1_wheel.onnx")
-    assert main(["estimate", model, str(KLS1), *SMOOTH, "--by", "run"]) == 0
+    assert main(["estimate", model, str(KLS1), *SMOOTH, "--by", "run", "--format", "csv"]) == 0
     captured = capsys.readouterr()
     assert captured.out.count("\n") == 2
     assert "mostly the prior" in captured.err

@@ -13,12 +13,7 @@ a plan, and its truth.
 """
 
 from datagen.blind_sets.blind_set import BlindSet, csv_text, draw_blind_set, write_blind_set
-from datagen.blind_sets.plans import (
-    MECHANISMS,
-    Plan,
-    benchmark_plans,
-    plan_matrix,
-)
+from datagen.blind_sets.plans import MECHANISMS, Plan, benchmark_plans
 
 __all__ = [
     "MECHANISMS",
@@ -27,6 +22,5 @@ __all__ = [
     "benchmark_plans",
     "csv_text",
     "draw_blind_set",
-    "plan_matrix",
     "write_blind_set",
 ]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,6 @@ from datagen.blind_sets.reference_wheel import (
     ActiveMechanisms,
     Floats,
     Mechanism,
-    SoilReaction,
     WheelState,
     solve_equilibrium,
 )
@@ -54,6 +54,7 @@ from datagen.blind_sets.soil_families import (
 
 #: Run-to-run scatter, one standard deviation: rad of phi, fraction of the modulus.
 SCATTER_PHI, SCATTER_K = np.deg2rad(0.5), 0.05
+SCATTER = ("friction_angle_offset_rad", "modulus_factor")  # Its members in the truth
 #: Names of the wheels where there are two; mechanisms that only the second has then, because they
 #: belong to its rim.
 GEARS = ("wheel_a", "wheel_b")
@@ -121,26 +122,26 @@ def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
         if plan.design == "two-gears":
             same_size = any(m.name in MECHANISMS_OF_ONE_GEAR for m, _ in active)
             wheels, region = draw_wheels(same_size, extras), with_both_gears(region)
-        simulated = [
-            _simulate(d, soil, wheels, plan.scatter, active, generator) for d in (runs, region)
-        ]
-        steady = _channels(_rows(region, soil, wheels), region, active)
-        bare = [_channels(_rows(d, soil, wheels), d, ()) for d in (runs, region)]
-        if not all(
-            np.isfinite(v).all() for p in (*(s for s, _ in simulated), steady, *bare) for v in p
-        ):
+        world = _World(soil, wheels, active)
+        scatter, simulated = [], []
+        for schedule in (runs, region):
+            scatter.append(_draw_scatter(schedule, plan.scatter, generator))
+            simulated.append(world.channels(schedule, scatter[-1]))
+        steady = world.channels(region)
+        bare = [replace(world, active=()).channels(d) for d in (runs, region)]
+        if not all(np.isfinite(v).all() for p in (*simulated, steady, *bare) for v in p):
             continue
         between = rows_between(runs, np.random.default_rng((plan.seed, attempt, 2)))
-        inside = _scattered(between, soil, wheels, active, simulated[0][1])
+        inside = world.channels(between, scatter[0])
         if not all(np.isfinite(v).all() for v in inside):
             continue
         beyond, where = beyond_schedule(runs)
         schedules = (runs, region, between, beyond)
-        extra = draw_discrepancies(plan.discrepancy, schedules, simulated[0][0], extras)
-        true = [_sum(s, e) for (s, _), e in zip(simulated, extra[:2], strict=True)]
+        extra = draw_discrepancies(plan.discrepancy, schedules, simulated[0], extras)
+        true = [_sum(s, e) for s, e in zip(simulated, extra[:2], strict=True)]
         inside = _sum(inside, extra[2])
         steady = _sum(steady, extra[1])
-        sinkages = [(t[2], s[2]) for t, (s, _) in zip(true, simulated, strict=True)]
+        sinkages = [(t[2], s[2]) for t, s in zip(true, simulated, strict=True)]
         if all(np.all(one >= LEAST_SINKAGE * other) for one, other in sinkages):
             break
     else:
@@ -174,7 +175,7 @@ def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
             "true_over_declared": 1.0 / DECLARED_OVER_TRUE if plan.tier == "N4" else 1.0,
             "autocorrelation": AUTOCORRELATION if plan.tier == "N2" else 0.0,
         },
-        "scatter": {"runs": simulated[0][1], "region": simulated[1][1]} if plan.scattered else {},
+        "scatter": dict(zip(("runs", "region"), scatter, strict=True)) if plan.scattered else {},
         "scatter_std": {
             "friction_angle_rad": SCATTER_PHI * plan.scatter,
             "modulus_fraction": SCATTER_K * plan.scatter,
@@ -183,11 +184,7 @@ def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
         "missing": list(missing),
         "covariates": sorted(COVARIATE_COLUMNS[name] for name in runs.varied),
         "runs_true": _by_channel(true[0]),
-        "runs_steady": _by_channel(
-            _channels(_rows(runs, soil, wheels), runs, active)
-            if plan.scattered
-            else simulated[0][0]
-        ),
+        "runs_steady": _by_channel(world.channels(runs) if plan.scattered else simulated[0]),
         "runs_without": _by_channel(bare[0]),
         "region_true": _by_channel(steady),
         "region_without": _by_channel(bare[1]),
@@ -200,9 +197,7 @@ def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
             "load_N": beyond.load.tolist(),
             "covariates": {name: float(v[0]) for name, v in beyond.covariates.items()},
             "true": _by_channel(
-                _sum(
-                    _channels(_rows(beyond, soil, wheels), beyond, _of_a_vehicle(active)), extra[3]
-                )
+                _sum(replace(world, active=_of_a_vehicle(active)).channels(beyond), extra[3])
             ),
         },
     }
@@ -232,46 +227,52 @@ def _stated_name(mechanism: Mechanism, design: str) -> str:
     return f"{mechanism.name}@{GEARS[1]}" if of_one else mechanism.name
 
 
-def _rows(schedule: RunSchedule, soil: dict[str, float], wheels: Wheels) -> WheelState:
-    """States of all rows on one soil."""
-    size = schedule.slip.size
-    full = {name: np.full(size, value) for name, value in soil.items()}
-    full["radius"], full["width"] = np.array(wheels)[schedule.gear].T
-    full["elapsed"] = schedule.elapsed
-    return WheelState(slip=schedule.slip, load=schedule.load, **schedule.covariates, **full)
+@dataclass(frozen=True)
+class _World:
+    """A soil, the wheels on it, and the mechanisms that act."""
+
+    soil: dict[str, float]
+    wheels: Wheels
+    active: ActiveMechanisms
+
+    def channels(
+        self, schedule: RunSchedule, scatter: Mapping[str, list[float]] | None = None
+    ) -> list[Floats]:
+        """Torque (N m), drawbar pull (N) and sinkage (m) of rows, in the order of the channels.
+
+        scatter: Deviation of the soil of each run. A mechanism of one gear does not act on the rows
+        of the other.
+        """
+        size = schedule.slip.size
+        full = {name: np.full(size, value) for name, value in self.soil.items()}
+        full["radius"], full["width"] = np.array(self.wheels)[schedule.gear].T
+        full |= {"elapsed": schedule.elapsed, "slip": schedule.slip, "load": schedule.load}
+        if scatter is not None:
+            phi, k = (np.asarray(scatter[name])[schedule.run] for name in SCATTER)
+            full["friction_angle"] = full["friction_angle"] + phi
+            full["kc"], full["kphi"] = full["kc"] * k, full["kphi"] * k
+        rows = WheelState(**full, **schedule.covariates)
+        shared = tuple((m, v) for m, v in self.active if m.name not in MECHANISMS_OF_ONE_GEAR)
+        found = _forces(rows, self.active)
+        if len(shared) == len(self.active) or not schedule.gear.any():
+            return found
+        pairs = zip(found, _forces(rows, shared), strict=True)
+        return [np.where(schedule.gear > 0, one, other) for one, other in pairs]
 
 
-def _simulate(
-    schedule: RunSchedule,
-    soil: dict[str, float],
-    wheels: Wheels,
-    scatter: float,
-    active: ActiveMechanisms,
-    generator: np.random.Generator,
-) -> tuple[list[Floats], dict[str, list[float]]]:
-    """True channels of the runs, with run-to-run scatter of the soil, and that scatter."""
+def _forces(rows: WheelState, active: ActiveMechanisms) -> list[Floats]:
+    reaction = solve_equilibrium(rows, active)
+    return [reaction.torque, reaction.pull, reaction.sinkage]
+
+
+def _draw_scatter(
+    schedule: RunSchedule, size: float, generator: np.random.Generator
+) -> dict[str, list[float]]:
+    """Deviation of the soil of each run, whose standard deviation is `size` times the usual one."""
     runs = int(schedule.run.max()) + 1
-    phi = SCATTER_PHI * generator.standard_normal(runs) * scatter
-    k = np.exp(SCATTER_K * generator.standard_normal(runs) * scatter)
-    drawn = {"friction_angle_offset_rad": phi.tolist(), "modulus_factor": k.tolist()}
-    return _scattered(schedule, soil, wheels, active, drawn), drawn
-
-
-def _scattered(
-    schedule: RunSchedule,
-    soil: dict[str, float],
-    wheels: Wheels,
-    active: ActiveMechanisms,
-    scatter: dict[str, list[float]],
-) -> list[Floats]:
-    """True channels of rows whose runs have this scatter."""
-    phi = np.asarray(scatter["friction_angle_offset_rad"])[schedule.run]
-    k = np.asarray(scatter["modulus_factor"])[schedule.run]
-    rows = _rows(schedule, soil, wheels)
-    values = {**vars(rows)}
-    values["friction_angle"] = rows.friction_angle + phi
-    values["kc"], values["kphi"] = rows.kc * k, rows.kphi * k
-    return _channels(WheelState(**values), schedule, active)
+    phi = SCATTER_PHI * generator.standard_normal(runs) * size
+    k = np.exp(SCATTER_K * generator.standard_normal(runs) * size)
+    return dict(zip(SCATTER, (phi.tolist(), k.tolist()), strict=True))
 
 
 def _of_a_vehicle(active: ActiveMechanisms) -> ActiveMechanisms:
@@ -284,21 +285,6 @@ def _times(schedule: RunSchedule) -> Floats:
     """Times (s) of the rows: a run takes a quarter of an hour, its rows follow in ten seconds."""
     first = np.searchsorted(schedule.run, schedule.run)
     return np.asarray(900.0 * schedule.run + 10.0 * (np.arange(schedule.run.size) - first))
-
-
-def _channels(rows: WheelState, schedule: RunSchedule, active: ActiveMechanisms) -> list[Floats]:
-    """Torque (N m), drawbar pull (N) and sinkage (m), in the order of the channels.
-
-    A mechanism of one gear does not act on the rows of the other.
-    """
-    reaction: SoilReaction = solve_equilibrium(rows, active)
-    channels = [reaction.torque, reaction.pull, reaction.sinkage]
-    shared = tuple((m, size) for m, size in active if m.name not in MECHANISMS_OF_ONE_GEAR)
-    if len(shared) == len(active) or not schedule.gear.any():
-        return channels
-    without = solve_equilibrium(rows, shared)
-    pairs = zip(channels, (without.torque, without.pull, without.sinkage), strict=True)
-    return [np.where(schedule.gear > 0, one, other) for one, other in pairs]
 
 
 def _measure(

@@ -1,4 +1,4 @@
-"""The blind sets to simulate: tiers of mechanisms, and balanced fractions of the full factorial."""
+"""The blind sets to simulate: tiers of mechanisms, and sets in which all levels are balanced."""
 
 from __future__ import annotations
 
@@ -75,9 +75,6 @@ FREE_COUNTS = (3, 5)
 DISCREPANCIES = (0.0, 0.01, 0.02, 0.04)
 #: Scatter of unequal soils over the usual one: 1.5 deg of phi and 15 % of the modulus.
 UNEQUAL_SCATTER = 3.0
-
-#: Number of blocks of nine plans for each mechanism of a tier.
-BLOCK_COUNTS = {"A": 4, "B": 3, "C": 3, "S": 2, "M": 3, "N0": 8, "N1": 8, "N2": 6, "N3": 6, "N4": 4}
 
 #: Sets of the benchmark with the design `sweep`: of each mechanism, or of a tier without one, at
 #: each of some discrepancies.
@@ -160,27 +157,11 @@ class Plan:
         return float(self.tier == "N1" or (self.tier == "B" and self.seed % 2 == 0))
 
 
-def plan_matrix(seed: int) -> list[Plan]:
-    """Plans without discrepancies: blocks of nine of each mechanism.
-
-    The blocks are orthogonal in noise, size, runs and soil family (Taguchi's L9). The levels are
-    permuted from block to block, so that within a mechanism all combinations of levels of two
-    factors are equally frequent; three and five free parameters alternate.
-    """
-    plans: list[Plan] = []
-    for tier, blocks in BLOCK_COUNTS.items():
-        for cause in mechanism_keys(tier):
-            generator = np.random.default_rng((seed, len(plans)))
-            for block in range(blocks):
-                plans += _block(tier, cause, block, 10_000 * seed + len(plans), generator)
-    return plans
-
-
 def benchmark_plans(seed: int = 0) -> list[Plan]:
     """The plans of the benchmark with discrepancies and designs, about 850.
 
     Within each tier and design, all levels of noise, size, runs, soil family and number of free
-    parameters are equally frequent. Seeds differ from those of `plan_matrix`.
+    parameters are equally frequent.
     """
     plans: list[Plan] = []
     for number, (_, group) in enumerate(groupby(_benchmark_cells(seed), lambda c: (c[0], c[3]))):
@@ -259,26 +240,3 @@ def _balanced(levels: tuple[T, ...], count: int, generator: np.random.Generator)
     """Levels in random order, each as often as any other, or once more."""
     order = generator.permutation(count) + int(generator.integers(len(levels)))
     return [levels[int(i) % len(levels)] for i in order]
-
-
-def _block(
-    tier: str, cause: str, block: int, seed: int, generator: np.random.Generator
-) -> list[Plan]:
-    levels = [generator.permutation(3) for _ in range(4)]
-    rows = [(i, j, (i + j) % 3, (i + 2 * j) % 3) for i in range(3) for j in range(3)]
-    plans = []
-    for position, row in enumerate(generator.permutation(9)):
-        noise, size, runs, family = (int(levels[k][rows[row][k]]) for k in range(4))
-        plans.append(
-            Plan(
-                tier=tier,
-                cause=cause,
-                size=0.0 if tier.startswith("N") else SIZES[size],
-                noise=NOISE_LEVELS[noise],
-                runs=RUNS[runs],
-                soil_family=list(FAMILIES)[family],
-                free=FREE_COUNTS[(int(row) + block) % 2],
-                seed=seed + position,
-            )
-        )
-    return plans

@@ -62,6 +62,13 @@ class RunSchedule:
     covariates: dict[str, Floats]
     varied: tuple[str, ...]
 
+    def select(self, rows: NDArray[np.int64]) -> RunSchedule:
+        """These rows, which may be repeated."""
+        arrays = ("run", "names", "slip", "load", "gear", "elapsed")
+        own = {name: getattr(self, name)[rows] for name in arrays}
+        covariates = {name: values[rows] for name, values in self.covariates.items()}
+        return replace(self, **own, covariates=covariates)
+
 
 def design_schedule(
     design: str,
@@ -139,20 +146,11 @@ def heavier_schedule(
 def rows_between(runs: RunSchedule, generator: np.random.Generator) -> RunSchedule:
     """Rows at other slips of the same runs, each within the slips of its run."""
     of = np.sort(generator.integers(runs.slip.size, size=ROWS_BETWEEN))
-    low = np.asarray([runs.slip[runs.run == i].min() for i in range(int(runs.run.max()) + 1)])
-    high = np.asarray([runs.slip[runs.run == i].max() for i in range(int(runs.run.max()) + 1)])
+    of_run = [runs.slip[runs.run == i] for i in range(int(runs.run.max()) + 1)]
+    low, high = (np.asarray([end(slip) for slip in of_run]) for end in (np.min, np.max))
     share = generator.uniform(0.0, 1.0, ROWS_BETWEEN)
     slip = low[runs.run[of]] + share * (high - low)[runs.run[of]]
-    return RunSchedule(
-        run=runs.run[of],
-        names=runs.names[of],
-        slip=np.round(slip, 4),
-        load=runs.load[of],
-        gear=runs.gear[of],
-        elapsed=runs.elapsed[of],
-        covariates={name: values[of] for name, values in runs.covariates.items()},
-        varied=runs.varied,
-    )
+    return replace(runs.select(of), slip=np.round(slip, 4))
 
 
 #: Loads beyond those driven, over the lightest and the heaviest; slips beyond the highest driven.
@@ -230,15 +228,12 @@ def _repeated(schedule: RunSchedule, times: int) -> RunSchedule:
     run = np.tile(schedule.run, times) + runs * again
     prefix = str(schedule.names[0]).rstrip("0123456789")
     names = np.array([f"{prefix}{i + 1:02d}" for i in range(runs * times)])
-    return RunSchedule(
+    rows = schedule.select(np.tile(np.arange(schedule.run.size), times))
+    return replace(
+        rows,
         run=run,
         names=names[run],
-        slip=np.tile(schedule.slip, times),
-        load=np.tile(schedule.load, times),
-        gear=np.tile(schedule.gear, times),
         elapsed=run / max(runs * times - 1, 1),
-        covariates={name: np.tile(v, times) for name, v in schedule.covariates.items()},
-        varied=schedule.varied,
     )
 
 

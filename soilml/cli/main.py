@@ -169,7 +169,7 @@ def parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
         )
         declare(sub, (*module.ARGUMENTS, "screen"))
         if formats := getattr(module, "FORMATS", ()):
-            text = "form of the result on standard output; tables of rows are CSV into a pipe"
+            text = "form of the result on standard output (default: table)"
             sub.add_argument("--format", choices=formats, help=text)
         if words is not None:
             root.known = [option for option in sub._option_string_actions if len(option) > 2]

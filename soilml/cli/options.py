@@ -94,7 +94,7 @@ SHARED: dict[str, tuple[Argument, ...]] = {
         ("--workers N", "number of processes (default: one for each core)", whole_number_from(1)),
     ),
     "screen": (
-        ("--quiet", "print no remarks on standard error"),
+        ("--quiet", "print no remarks and no progress"),
         ("--verbose", "print all details of the result"),
     ),
 }

@@ -1,4 +1,4 @@
-"""Output of a command: files, CSV or JSON into a pipe, reports and tables on a terminal."""
+"""Output of a command: files, and the result as text, CSV or JSON on standard output."""
 
 from __future__ import annotations
 
@@ -61,8 +61,7 @@ def deliver(
     """Write --out, --picture and --report as one set, and show the result.
 
     content: What JSON has, in SI units; by default the columns.
-    columns: Rows of a table: --out is then CSV, unless it is FILE.json, and so is what is printed
-        into a pipe. Otherwise --out is JSON.
+    columns: Rows of a table: --out is then CSV, unless it is FILE.json. Otherwise it is JSON.
     read: Input files that no argument names.
     others: What is written to --out in the place of these, and further files, by path.
     """
@@ -80,10 +79,15 @@ def deliver(
         files |= report_texts(report, origin_of(args, read), content, names, Path(folder))
     files |= {Path(path): own for path, own in (others or {}).items()}
     write_files(files, folders=[folder])
-    if columns is None or (not SCREEN.form and (out or folder)):
+    if columns is None or SCREEN.form != "csv":
         show_result(report, {k: v for k, v in content.items() if k != "draws"})  # for files
-    else:
-        show_rows(report, columns, content)
+        return
+    tell_columns(columns, None)
+    for text in (
+        *(f"! {r.text}" for r in report.remarks),
+        *map("next: {}".format, report.next_steps),
+    ):
+        tell(text)
 
 
 def save_columns(columns: Mapping[str, Any], path: Path) -> None:
@@ -93,23 +97,30 @@ def save_columns(columns: Mapping[str, Any], path: Path) -> None:
 
 
 def tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
-    """Say how many rows were written to `out`; without one, print them as table or CSV."""
+    """Say how many rows were written to `out`; without one, print them.
+
+    A table begins with the status where one is not `ok`, and is without it otherwise.
+    """
     if out is not None:
         count = len(next(iter(columns.values())))
         tell(f"{count} row{'' if count == 1 else 's'} written to {out}")
         return
-    form = SCREEN.form_of_rows()
-    if form == "csv":
+    if SCREEN.form == "csv":
         for text in csv_blocks(columns):
             write_stdout(text)
         return
-    content = {name: np.asarray(values).tolist() for name, values in columns.items()}
-    table = ReportTable.of("rows", columns).text
-    write_stdout(f"{table()}\n" if form == "table" else json_text(content))
+    if SCREEN.form == "json":
+        content = {name: np.asarray(values).tolist() for name, values in columns.items()}
+        write_stdout(json_text(content))
+        return
+    status = {"status": columns["status"]} if "status" in columns else {}
+    first = status if any(v != "ok" for v in status.get("status", ())) else {}
+    others = {name: values for name, values in columns.items() if name != "status"}
+    write_stdout(f"{ReportTable.of('rows', first | others).text()}\n")
 
 
 def show_result(report: Report, content: Mapping[str, Any]) -> None:
-    """Print a report as text, into a pipe too, or its content as JSON where --format says so.
+    """Print a report as text, or its content as JSON where --format says so.
 
     -v prints all of it, -q no remarks.
     """
@@ -117,16 +128,6 @@ def show_result(report: Report, content: Mapping[str, Any]) -> None:
         write_stdout(json_text(content))
         return
     show((replace(report, remarks=()) if SCREEN.quiet else report).text(SCREEN.verbose))
-
-
-def show_rows(report: Report, columns: Mapping[str, Any], content: Any) -> None:
-    """Print CSV into a pipe, with remarks on standard error; else as `show_result`."""
-    if SCREEN.form_of_rows() != "csv":
-        show_result(report, content)
-        return
-    tell_columns(columns, None)
-    for text in [*(f"! {remark}" for remark in report.remarks), *report.next_steps]:
-        tell(text)
 
 
 def show(text: str) -> None:

@@ -1,7 +1,8 @@
 """Progress on standard error, for everything that takes more than about two seconds.
 
-A terminal shows bars. Elsewhere, as in the log of a job, there are a few lines: the first after
-`FIRST_LINE` seconds, so that quick commands are silent, and then one in `BETWEEN_LINES` seconds.
+It is one line. A terminal shows it redrawn, and without it when the work is done. Elsewhere, as in
+the log of a job, it is printed: first after `FIRST_LINE` seconds, so that quick commands are
+silent, and then once in `BETWEEN_LINES` seconds. With -q there is none.
 """
 
 from __future__ import annotations
@@ -10,117 +11,69 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from contextlib import contextmanager, suppress
 
-if TYPE_CHECKING:
-    from rich.progress import Progress
+from soilml.cli.screen import SCREEN
 
-#: Seconds before the first line, and between two lines, where standard error is no terminal.
-FIRST_LINE, BETWEEN_LINES = 2.0, 20.0
+#: Seconds before the first line, and between two lines; the latter on a terminal.
+FIRST_LINE, BETWEEN_LINES, BETWEEN_DRAWN = 2.0, 20.0, 0.2
+_ERASE = "\r\033[K"  # To the beginning of the line, which is blank then
 
 
 @contextmanager
 def progress_bar(text: str, total: int | None) -> Iterator[Callable[[int], None]]:
-    """A function of the number of items done, which draws a bar, or prints a line at times."""
-    if not sys.stderr.isatty():
-        yield _lines(text, total)
-        return
-    with _bars(counted=total is not None, transient=True) as progress:
-        task = progress.add_task(text, total=total)
-        yield lambda done: progress.update(task, completed=done)
+    """A function of the number of items done, of `total` or of a number that is not known."""
+    with stage_progress() as stages:
+        yield lambda done: stages(text, done, total or 0)
 
 
 @contextmanager
 def working(text: str) -> Iterator[None]:
-    """A bar that moves, with the time, for work whose share done is not known; or one line."""
-    if sys.stderr.isatty():
-        with progress_bar(text, None):
+    """The same for work whose share done is not known: one line."""
+    with stage_progress() as stages:
+        line = threading.Timer(FIRST_LINE, stages, [text, 0, 0])
+        line.daemon = True
+        line.start()
+        try:
             yield
-        return
-    line = threading.Timer(FIRST_LINE, _say, [f"{text} ..."])
-    line.daemon = True
-    line.start()
-    try:
-        yield
-    finally:
-        line.cancel()
+        finally:
+            line.cancel()
 
 
 @contextmanager
 def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
-    """A function (stage, done, total): a bar for each stage on a terminal, otherwise lines."""
-    if not sys.stderr.isatty():
-        stages: dict[str, Callable[[int], None]] = {}
-        started = time.monotonic()
+    """A function (stage, done, total) for work in stages; a total of 0 is not known."""
+    started = shown = time.monotonic()
+    stage, begun = "", started
 
-        def announce(text: str, done: int, total: int) -> None:
-            if text not in stages:
-                stages[text] = _lines(text, total, BETWEEN_LINES)
-                if time.monotonic() > started + FIRST_LINE:
-                    _say(f"{text} ...")
-            stages[text](done)
-
-        yield announce
-        return
-    tasks: dict[str, Any] = {}
-    with _bars(counted=False, transient=False) as progress:
-
-        def update(text: str, done: int, total: int) -> None:
-            if text not in tasks:
-                tasks[text] = progress.add_task(text, total=total)
-            progress.update(tasks[text], completed=done, total=total)
-
-        yield update
-
-
-def _bars(*, counted: bool, transient: bool) -> Progress:
-    """Bars on a terminal, with or without the numbers of items."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        *([TextColumn("{task.completed}/{task.total}")] if counted else []),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=transient,
-    )
-
-
-def _lines(text: str, total: int | None, first: float | None = None) -> Callable[[int], None]:
-    """A function of the number of items done that prints a line where it is time for one."""
-    started = time.monotonic()
-    due = started + (FIRST_LINE if first is None else first)
-
-    def tell(done: int) -> None:
-        nonlocal due
+    def say(text: str, done: int, total: int) -> None:
+        nonlocal stage, begun, shown
         now = time.monotonic()
-        if now < due or (total is not None and done >= total):
+        is_new = text != stage
+        if is_new:
+            stage, begun = text, now if stage else started
+        if SCREEN.quiet or now < started + FIRST_LINE or (0 < total <= done):
             return
-        due = now + BETWEEN_LINES
-        if not total:
-            _say(f"{text} ...")
+        drawn = sys.stderr.isatty()
+        between = BETWEEN_DRAWN if drawn else BETWEEN_LINES
+        if not is_new and shown > started and now < shown + between:
             return
-        left = f", about {_duration((now - started) * (total - done) / done)} left" if done else ""
-        _say(f"{text}: {100 * done // total} %{left}")
+        shown = now
+        line = f"{text} ..."
+        if total and done:
+            left = _duration((now - begun) * (total - done) / done)
+            line = f"{text}: {100 * done // total} %, about {left} left"
+        print(f"{_ERASE}{line}" if drawn else line, end="" if drawn else "\n", file=sys.stderr)
+        sys.stderr.flush()
 
-    return tell
+    try:
+        yield say
+    finally:
+        if shown > started and sys.stderr.isatty():
+            with suppress(OSError):
+                print(_ERASE, end="", file=sys.stderr, flush=True)
 
 
 def _duration(seconds: float) -> str:
     """Such as 40 s, or 3 min."""
     return f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)

@@ -10,17 +10,13 @@ from dataclasses import dataclass
 class Screen:
     """The choices of --format, -q and -v for the command that runs."""
 
-    form: str | None = None
+    form: str = "table"
     quiet: bool = False
     verbose: bool = False
 
     def choose(self, form: str | None, quiet: bool, verbose: bool) -> None:
         """Take the options of a command."""
-        self.form, self.quiet, self.verbose = form, quiet, verbose
-
-    def form_of_rows(self) -> str:
-        """Form of a table of rows: CSV into a pipe unless another one was chosen."""
-        return self.form or ("table" if is_terminal() else "csv")
+        self.form, self.quiet, self.verbose = form or "table", quiet, verbose
 
 
 SCREEN = Screen()

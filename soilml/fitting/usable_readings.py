@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -39,15 +40,10 @@ def usable_readings(case: Case, table: Table, *, drifts: bool = True) -> Reading
     Raises `InputError` where no row remains, `TableError` where the table names another wheel than
     the case's, `FitError` where no reading remains or all standard deviations of one are zero.
     """
-    models = (case.model, *case.gears.values())
-    table, faults = sound_rows(case, table)
-    if drifts or any(effect.about.uses for model in models for effect in model.effects):
-        table = with_order_columns(case, table, FROM_ORDER if drifts else None)
-    table, excluded = answered_rows(with_rover_columns(case, table))
-    check_wheel_size(case, table)
+    table, remarks = prepared_rows(case, table, FROM_ORDER if drifts else None)
     if isinstance(case.model.gear, EmulatedGear):
         check_design(case.model.gear, table)
-    notes = [*faults, *_remarks_on(case, table), *excluded]
+    notes = [*remarks, *_remarks_on(case, table)]
     found = stack_readings(case, table)
     if not found.channels:
         raise FitError(f"{table.source}: no reading of {', '.join(map(column, CHANNELS))}")
@@ -57,6 +53,23 @@ def usable_readings(case: Case, table: Table, *, drifts: bool = True) -> Reading
     if not kept or not unknown:
         return found
     return replace(found.of_channels(kept), excluded_channels=unknown)
+
+
+def prepared_rows(
+    case: Case, table: Table, fields: Collection[str] | None
+) -> tuple[Table, list[Remark]]:
+    """The rows that analyses of a case use, with what follows from their order, and remarks.
+
+    fields: As `with_order_columns` takes them.
+
+    Raises `InputError` where no row remains, `TableError` where the table names another wheel than
+    the case's, or two columns are the same.
+    """
+    table, faults = sound_rows(case, table)
+    table = with_rover_columns(case, with_order_columns(case, table, fields))
+    check_wheel_size(case, table)
+    table, excluded = answered_rows(table)
+    return table, [*faults, *excluded]
 
 
 def check_design(gear: EmulatedGear, table: Table) -> None:

@@ -9,7 +9,8 @@ import sys
 from types import ModuleType
 
 from soilml.gap.identifiability import Audit, audit
-from soilml.gap.results import STATUSES, GapReport
+from soilml.gap.results import GapReport
+from soilml.gap.statuses import STATUSES
 from soilml.gap.workflow import gap
 
 __all__ = ["STATUSES", "Audit", "GapReport", "audit", "gap"]

@@ -12,7 +12,6 @@ from soilml.arrays import Floats
 from soilml.gap.held_out import held_out_folds
 from soilml.gap.results import RemainderCause
 from soilml.gap.stage_changes import OPERATING, stage_changes
-from soilml.inference.conditional import conditional
 from soilml.inference.constants import IN_CATALOGUE, UNKNOWN_CAUSE, UNKNOWN_SCALE
 from soilml.inference.evidence import LinearisedFit
 from soilml.inference.explanation import Explanation
@@ -39,8 +38,6 @@ STATED_ODDS, VARIABLE_ODDS = 10.0, 3.0
 NO_STAGE = 0.5
 #: What an error of slip or load may depend on: they are not measured in the contact.
 OF_OPERATION = ("slip", "load", "slip and load", "progress")
-#: Change of a channel, in its noise, from which it is said to share the cause.
-NOTICED = 0.5
 SEVERAL = "several causes"
 
 
@@ -106,10 +103,9 @@ def described_cause(posterior: Posterior, node: Explanation, seed: int) -> Remai
     logs = {v: _log_mean(one.value for one in own if one.variable == v) for v in variables}
     variable, share = _normalised(logs)
     told = share > VARIABLE_ODDS / (1.0 + VARIABLE_ODDS)
-    channels = _changed_channels(posterior, node, best)
     probability *= IN_CATALOGUE  # as of any cause that is stated
     beside = node.hypothesis.effects
-    return RemainderCause(stage, variable if told else "", channels, probability, gain, beside)
+    return RemainderCause(stage, variable if told else "", probability, gain, beside)
 
 
 def likeliest_stage(none: float, found: Sequence[StageHypothesis]) -> tuple[str, float]:
@@ -173,35 +169,17 @@ def _with_change(model: LinearisedFit, one: StageHypothesis) -> LinearisedFit:
     )
 
 
-def _changed_channels(
-    posterior: Posterior, node: Explanation, best: StageHypothesis
-) -> tuple[str, ...]:
-    """Channels that the change moves by more than `NOTICED`, root mean square in their noise."""
-    assert best.at is not None
-    model = _with_change(node.linear, best)
-    found, k = conditional(model, best.at), best.columns.shape[1]
-    own = slice(-len(model.x) - k, -len(model.x))
-    moved = found.columns[:, own] @ found.mean[own] / posterior.std
-    readings = posterior.terms.readings
-    return tuple(
-        name
-        for i, name in enumerate(readings.channels)
-        if np.sqrt(np.mean(moved[readings.channel == i] ** 2)) > NOTICED
-    )
-
-
 def hypotheses(posterior: Posterior, node: Explanation) -> list[StageHypothesis]:
     """All changes of stages and of single channels, by what they may depend on."""
     readings, usual, fit = posterior.terms.readings, posterior.terms.usual, node.fit
     variables = _variables(posterior, node)
     found = []
-    for change in stage_changes(fit.fitted(), readings):
-        if change.along:
-            found.append(StageHypothesis(change.stage, change.along, change.columns))
-            continue
-        for name, columns in variables.items():
-            if change.stage != OPERATING or name in OF_OPERATION:
-                found.append(StageHypothesis(change.stage, name, change.columns * columns))
+    for stage, change in stage_changes(fit.fitted(), readings):
+        found += [
+            StageHypothesis(stage, name, change[:, None] * columns)
+            for name, columns in variables.items()
+            if stage != OPERATING or name in OF_OPERATION
+        ]
     for i, channel in enumerate(readings.channels):
         own = readings.channel == i
         for name, columns in variables.items():

@@ -9,6 +9,7 @@ import numpy as np
 
 from soilml.fitting.least_squares import Solution
 from soilml.gap.results import GapReport
+from soilml.gap.statuses import STATUSES
 from soilml.inference.posterior import Posterior
 from soilml.remarks import Remark
 
@@ -17,30 +18,6 @@ from soilml.remarks import Remark
 VISIBLE, UNSEEN = 6.0, 2.0
 #: Share of the largest contribution to the other soil from which a parameter is stated.
 NOTABLE = 0.3
-
-_OUTSIDE = Remark(
-    "outside-catalogue",
-    "that no cause outside the catalogue has the same signature as the named effect",
-)
-_LAW = "the law of the effect: slip_power, by_slip and by_load describe these data empirically"
-#: What each status does not support.
-_BY_STATUS = {
-    "named": [_OUTSIDE],
-    "partly-named": [
-        _OUTSIDE,
-        Remark("remaining-discrepancy", "the cause of the remaining discrepancy"),
-    ],
-    "form-open": [_OUTSIDE, Remark("law", _LAW)],
-    "class": [
-        Remark("which-effect", "which of the effects is present; model.toml mixes all that hold")
-    ],
-    "unknown": [
-        Remark("cause", "any cause: model.toml contains the refitted soil and no new effect")
-    ],
-    "suspected": [
-        Remark("cause", "any cause: model.toml predicts by a mixture of the explanations")
-    ],
-}
 
 
 def unsupported_conclusions(
@@ -53,7 +30,7 @@ def unsupported_conclusions(
     if report.status in ("no-gap", "undecided"):
         text = "that the model is complete: these runs merely show no disagreement"
         return [*found, Remark("model-complete", text)]
-    found += _BY_STATUS.get(report.status, [])
+    found += STATUSES[report.status].unsupported
     if fixed:
         text = (
             f"that {', '.join(fixed)} in the model file are correct: they were fixed. An error in "

@@ -77,20 +77,20 @@ def decide(
     obstacles: Sequence[Remark],
     disagreements: Sequence[Remark],
 ) -> Decision:
-    """The status of a report; see `soilml.gap.results.STATUSES`.
+    """The status of a report; see `soilml.gap.statuses.STATUSES`.
 
     gains: Log density of rows kept back by the first sets, above that of the soil alone.
     obstacles: Why these runs cannot identify a cause.
     disagreements: Measurements that disagree with each other, which forbid a verdict without a gap.
     """
     none = posterior.no_effect
-    if posterior.no_gap > constants.NO_GAP:
+    if posterior.no_gap > constants.LIKELIER:
         return Decision("undecided" if disagreements else "no-gap")
     ranked = ranked_sets(posterior)
     chance = posterior.probability(*ranked[0]) if ranked else 0.0
     if _is_other_soil(posterior) and none > max(constants.UNCERTAIN, chance):
         return Decision("undecided")
-    hopeless = constants.HOPELESS if obstacles else 0.0
+    hopeless = 1.0 - constants.UNCERTAIN if obstacles else 0.0
     if not ranked or (none > constants.UNCERTAIN and none > max(chance, hopeless)):
         return Decision("not-testable" if obstacles else "unknown")
     listed = not_rejected(posterior, ranked)
@@ -108,13 +108,13 @@ def decide(
         if unchecked := _unchecked_faults(posterior, best):
             return replace(suspected, reason=_reason("unchecked-fault", unchecked))
         status = "named"
-        if node.share_without < 0.5:
+        if node.share_without < constants.LIKELIER:
             status = "partly-named"
         elif node.hypothesis.free_law and law_matters(posterior, node):
             status = "form-open"
         return Decision(status, (best,), listed[:1], node)
     together = sum(posterior.sets[names] for names in listed)
-    if none <= constants.CHANCE and len(listed) > 1 and together >= constants.CLASS_PROBABILITY:
+    if none <= constants.CHANCE and len(listed) > 1 and together >= constants.LIKELIER:
         return Decision("class", listed, listed, node)
     return replace(suspected, reason=NOT_DECISIVE)
 
@@ -139,7 +139,7 @@ def _doubt(posterior: Posterior, node: Explanation, gain: float) -> Remark | Non
     if not gain > 0.0:
         return _reason("not-predictive", names)
     amplitude = posterior.terms.amplitude(node.at)
-    if amplitude.max(initial=0.0) >= constants.LARGE_REMAINDER:
+    if amplitude.max(initial=0.0) >= constants.TOO_LARGE:
         left = posterior.terms.readings.channels[int(np.argmax(amplitude))]
         text = f"beside {' + '.join(names)}, at least four times the usual error of a model is left"
         text += f" in the {left.replace('_', ' ')}"
@@ -166,7 +166,7 @@ def implausible_faults(fit: Solution) -> tuple[str, ...]:
     return tuple(
         c.effect
         for c, d in zip(fit.coordinates, deviation, strict=True)
-        if c.effect and not c.is_shape and d > constants.MAX_SIZE_DEVIATION
+        if c.effect and not c.is_shape and d > constants.TOO_LARGE
     )
 
 
@@ -185,7 +185,7 @@ def suspects(
     """Explanations with their odds against all others, the first one that is shown first."""
     ranked = ranked_sets(posterior)
     first = decision.listed[:1] or tuple(ranked[:1])
-    rest = [n for n in ranked if posterior.within(n) > constants.LEAST_SUSPECTED]
+    rest = [n for n in ranked if posterior.within(n) > constants.LEAST_DRAWN]
     rest = [n for n in rest if not any(set(n) <= set(o) or set(o) < set(n) for o in first)]
     found = []
     for names in [*first, *rest[: LISTED_SUSPECTS - 1]]:
@@ -199,23 +199,11 @@ def suspects(
 def reasons(
     decision: Decision, obstacles: Sequence[Remark], disagreements: Sequence[Remark]
 ) -> tuple[Remark, ...]:
-    """Why no cause can be named, or why the absence of a gap is not stated.
-
-    Of the replicate rows that disagree, the worst are named beside the suspects, because no
-    suspect explains their difference.
-    """
-    if decision.status == "undecided":
-        return tuple(disagreements)
+    """Why no cause can be named, or why the absence of a gap is not stated."""
     own = (decision.reason,) if decision.reason else ()
-    if decision.status == "not-testable":
-        return tuple(obstacles)
-    if decision.status != "suspected":
-        return own
-    why = (*obstacles, *own)
-    if not disagreements:
-        return why
-    worst = replace(disagreements[0], text=f"replicate rows disagree: {disagreements[0]}")
-    return (*(why or (NOT_DECISIVE,)), worst)
+    by_status = {"undecided": disagreements, "not-testable": obstacles}
+    by_status["suspected"] = (*obstacles, *own)
+    return tuple(by_status.get(decision.status, own))
 
 
 def law_matters(posterior: Posterior, node: Explanation) -> bool:

@@ -17,8 +17,8 @@ from soilml.fitting.misfit import (
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
 from soilml.gap.held_out import held_out_region
-from soilml.gap.repeats import chi_square_tail, repeats_that_disagree
 from soilml.gap.results import NoiseAgreement
+from soilml.gap.scores import chi_square_tail
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.inference.conditional import conditional
 from soilml.inference.constants import PRESSED, SCATTER_UNITS
@@ -124,7 +124,7 @@ def disagreements(posterior: Posterior) -> list[Remark]:
     """What disagrees with what although no smooth gap was found; empty where nothing does."""
     soil, terms = posterior.soil, posterior.terms
     readings, at = terms.readings, soil.without.at
-    found = repeats_that_disagree(posterior, soil.fit)
+    found = list[Remark]()
     for name, scale in zip(readings.channels, terms.noise_scale(at), strict=True):
         if scale >= NOISE_SCALED_UP:
             text = (

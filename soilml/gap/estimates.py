@@ -11,29 +11,20 @@ from soilml.config.explanations import CaseExplanation
 from soilml.config.measurement_noise import Discrepancy, unestimated_bias
 from soilml.config.remainder import Remainder
 from soilml.fitting.coordinates import rates_at
-from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.least_squares import Solution
 from soilml.gap.decision import Decision
 from soilml.gap.remainder import discrepancy_amplitudes, learned_remainder
-from soilml.gap.results import CandidateSummary, NamedEffect
-from soilml.gap.scores import SignatureSimilarity
+from soilml.gap.results import NamedEffect
 from soilml.inference import constants
 from soilml.inference.constants import INTERVAL_FACTOR, SCATTER_UNITS
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
 from soilml.numerics.prior import Prior
 from soilml.quantities import column
-from soilml.remarks import Remark
 from soilml.report.numbers import round_significant
 from soilml.results import EstimatedValue
 
 PRIOR_HALF_WIDTH = 3.0  # Half width of the prior of an effect's size, in standard deviations
-#: Verdicts on candidates, where a cause is claimed and where none is, in words.
-_VERDICTS = {
-    "best": ("explains the data", "fits best, not claimed"),
-    "not-rejected": ("not rejected", "not rejected, not claimed"),
-    "rejected": ("rejected against the best",) * 2,
-}
 
 
 def stds_of(node: Explanation) -> dict[str, float]:
@@ -143,21 +134,6 @@ def soil_after(posterior: Posterior, seed: int) -> dict[str, EstimatedValue]:
     }
 
 
-def candidate_summaries(posterior: Posterior, decision: Decision) -> list[CandidateSummary]:
-    """The fitted sets of effects, the likeliest first, each with its likeliest law and soil."""
-    values = {n.hypothesis.effects: n.value for n in posterior.nodes[::-1]}
-    alone = values.pop((), np.inf)
-    lowest = min(values.values(), default=0.0)
-    summaries = []
-    for names, value in sorted(values.items(), key=lambda item: item[1]):
-        code = "not-rejected" if value < lowest + constants.NEAR else "rejected"
-        if names in decision.listed[:1]:
-            code = "best"
-        verdict = Remark(code, _VERDICTS[code][0 if decision.claimed else 1], names, "note")
-        summaries.append(CandidateSummary(names, alone - value, value - lowest, verdict))
-    return summaries
-
-
 def variance_component_entries(posterior: Posterior) -> dict[str, float]:
     """Noise scales, scatter and autocorrelation of the likeliest hypothesis, by their names."""
     terms, at = posterior.terms, posterior.noise
@@ -173,43 +149,23 @@ def variance_component_entries(posterior: Posterior) -> dict[str, float]:
     }
 
 
-def signature_similarity(posterior: Posterior, node: Explanation) -> SignatureSimilarity:
-    """Similarity of the catalogue's signatures beside the discrepancy of a node, on its soil."""
-    problem, readings = posterior.problem, posterior.terms.readings
-    whiten = posterior.terms.whiten(node.at, node.outliers)
-    soil = [i for i, c in enumerate(node.fit.coordinates) if not c.effect]
-    values = node.fit.values()
-    paths = [node.fit.coordinates[i].path for i in soil]
-    case = problem.case.with_values({path: values[path] for path in paths})
-    signatures, _ = effect_signatures(case, readings, problem.effects)
-    columns = {s.name: np.asarray(whiten @ s.column) for s in signatures}
-    space = np.asarray(whiten @ node.fit.derivatives[:, soil])
-    return SignatureSimilarity.beside(space, columns)
-
-
-def named_effects(
-    posterior: Posterior, decision: Decision, similarity: SignatureSimilarity
-) -> list[NamedEffect]:
+def named_effects(posterior: Posterior, decision: Decision) -> list[NamedEffect]:
     """The effects of the first claimed set, with those of the other ones."""
     node, best = decision.shown, decision.claimed[0]
     assert node is not None
     alternatives = {n for names in decision.claimed[1:] for n in names} - set(best)
-    values, stds, effects = node.fit.values(), stds_of(node), []
-    for name in best:
-        own = [(c, float(x)) for c, x in zip(node.fit.coordinates, node.fit.x, strict=True)]
-        own = [(c, x) for c, x in own if c.effect == name]  # the size precedes the shape of its law
-        snr, rival = similarity.separation(name, own[0][1] if own else 0.0)
-        effects.append(
-            NamedEffect(
-                name=name,
-                parameters={
-                    c.name: EstimatedValue(values[c.path], stds[c.path], c.unit) for c, _ in own
-                },
-                alternatives=tuple(sorted(alternatives)),
-                separating_snr=snr,
-                nearest_rival=rival,
-                probability=posterior.probability(name),
-                log_odds=posterior.log_odds(name),
-            )
+    values, stds = node.fit.values(), stds_of(node)
+    return [
+        NamedEffect(
+            name=name,
+            parameters={
+                c.name: EstimatedValue(values[c.path], stds[c.path], c.unit)
+                for c in node.fit.coordinates
+                if c.effect == name
+            },
+            alternatives=tuple(sorted(alternatives)),
+            probability=posterior.probability(name),
+            log_odds=posterior.log_odds(name),
         )
-    return effects
+        for name in best
+    ]

@@ -11,13 +11,13 @@ from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
-from soilml.gap.repeats import chi_square_tail
+from soilml.gap.scores import chi_square_tail
 from soilml.gap.sentences import outliers_in_words
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
 from soilml.numerics.prior import Prior
-from soilml.numerics.subspaces import ROUNDING, column_space, project_out
+from soilml.numerics.subspaces import project_out
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import channel_name, decimal, format_quantity
@@ -106,38 +106,22 @@ def _beyond_priors(given: Mapping[str, Prior], fit: Solution) -> Iterator[Remark
 
 
 def _large_noise(posterior: Posterior, soil: Solution) -> Iterator[Remark]:
-    r"""Notes on channels whose residuals about the soil alone are too small for their noise.
+    """Notes on channels whose residuals about the soil alone are too small for their noise.
 
-    With the residuals r in standard deviations of the readings and :math:`A = I - H`, the
-    projection out of what the soil explains, the squares of channel c are, under that noise, nearly
-    a multiple of chi-squared,
-
-    .. math::
-        r_c^T r_c \sim \frac{\mathrm{tr} A_{cc}^2}{\mathrm{tr} A_{cc}} \chi^2_k, \quad
-        k = \frac{(\mathrm{tr} A_{cc})^2}{\mathrm{tr} A_{cc}^2}
-
-    A gap, or scatter of the soil, makes them larger; correlated noise is in part explained by the
-    soil.
-
-    References: Satterthwaite, Biometrics Bulletin 2, 1946.
+    Their squares are nearly chi-squared, with the channel's share of the degrees of freedom: a gap,
+    or scatter of the soil, only makes them larger.
     """
     readings = posterior.terms.readings
-    std = readings.std
-    basis = column_space(soil.derivatives / std[:, None], relative_tolerance=ROUNDING)
-    residual = (readings.measured - soil.prediction) / std
-    residual = residual - basis @ (basis.T @ residual)
+    left = 1.0 - len(soil.x) / len(readings)
     for i, name in enumerate(readings.channels):
         own = readings.channel == i
-        projection = np.eye(int(own.sum())) - basis[own] @ basis[own].T
-        expected, spread = float(np.trace(projection)), float(np.sum(projection**2))
-        squares = float(np.sum(residual[own] ** 2))
-        if squares <= 0.0 or spread <= 0.0:
-            continue
-        by_chance = 1.0 - chi_square_tail(squares * expected / spread, expected**2 / spread)
-        if by_chance < SIGNIFICANCE / len(readings.channels):
+        residual = (readings.measured - soil.prediction)[own] / readings.std[own]
+        squares, freedom = float(residual @ residual), left * float(own.sum())
+        by_chance = 1.0 - chi_square_tail(squares, freedom)
+        if squares > 0.0 and by_chance < SIGNIFICANCE / len(readings.channels):
             text = (
                 f"the noise of {column(name)}, with that of slip and load, is declared "
-                f"{decimal(np.sqrt(expected / squares), 2)} times too large for these rows, which "
+                f"{decimal(np.sqrt(freedom / squares), 2)} times too large for these rows, which "
                 "hides small gaps"
             )
             yield Remark("noise-too-large", text, (column(name),))

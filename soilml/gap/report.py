@@ -9,8 +9,9 @@ import numpy as np
 
 from soilml.gap.checks import MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS
 from soilml.gap.pictures import bars_picture, map_picture, remainder_picture
-from soilml.gap.results import STATUSES, GapReport
+from soilml.gap.results import GapReport
 from soilml.gap.sentences import needed_sizes
+from soilml.gap.statuses import STATUSES
 from soilml.io.text_tables import csv_text
 from soilml.remarks import texts
 from soilml.report.numbers import channel_name
@@ -18,30 +19,9 @@ from soilml.report.page import Provenance, json_text, page, report_entry
 from soilml.report.report import Picture, Report
 from soilml.report.tables import Column, ReportTable
 
-#: What the reader should do, by status.
-_ADVICE = {
-    "no-gap": "Use the model as it is, within the measured range of slip and load.",
-    "undecided": "Find out why the measurements disagree: correct the noise in the model file or "
-    "the runs, and analyse again.",
-    "suspected": "Make the first run under Next runs. model.toml mixes the explanations that hold "
-    "95 % together, each with its weight.",
-    "partly-named": "model.toml contains the effect and, under [discrepancy], the size of what is "
-    "left, which widens every interval computed from it. Make the first run under Next runs.",
-    "named": "model.toml contains the effect. Make the first run under Next runs to confirm it.",
-    "class": "Make the first run under Next runs: it discriminates best between the explanations.",
-    "form-open": "model.toml contains the effect with a law fitted to these data. Use it within "
-    "the measured range of slip and load.",
-    "unknown": "See where the model disagrees, then check the sensors and the rig, or define an "
-    "effect of your own.",
-    "not-testable": "Add the runs that the verdict asks for, and analyse again.",
-    "bad-data": "Correct the runs or the model file as listed below, and analyse again.",
-}
 #: Statuses whose advice is to make the first of the next runs.
 _ADVISES_NEXT_RUN = ("suspected", "partly-named", "named", "class")
-#: Statuses under which suspects are listed: a named cause is not one of several suspects.
-_WITH_SUSPECTS = ("suspected", "unknown", "class", "not-testable")
-_TONES = {"no-gap": "good", "named": "plain", "partly-named": "plain", "bad-data": "bad"}
-_LISTED, _CANDIDATES = 6, 12  # Suspects and candidates that are listed
+_LISTED = 6  # Explanations that are listed
 _MOST_SIGMA = 10.0  # Discrimination beyond which only this bound is stated
 #: Names of the parts of the rows, by those of the figures in gap.json.
 PARTS = {
@@ -82,7 +62,8 @@ def gap_report(found: GapReport, title: str = "Gap between model and measurement
         ("Conclusions that this report does not support", texts(found.not_claimed)),
         ("Effects that these runs cannot test", untested),
     ]
-    step = _ADVICE.get(found.status, "")
+    status = STATUSES[found.status]
+    step = status.advice
     if found.status in _ADVISES_NEXT_RUN and not found.next_runs:
         step = "Make runs at other slips and loads, and analyse all runs together."
     return Report(
@@ -93,12 +74,12 @@ def gap_report(found: GapReport, title: str = "Gap between model and measurement
         tables=[*_tables(found)],
         pictures=[*_pictures(found)],
         remarks=found.notes,
-        next_steps=[step] if step else [],
+        next_steps=[step],
         details=[entry for entry in details if entry[1]],
         status=found.status,
-        tone=_TONES.get(found.status, "warn"),
+        tone=status.tone,
         title=title,
-        basis=f"{STATUSES.get(found.status, '')}; seed {found.seed}",
+        basis=f"{status.meaning}; seed {found.seed}",
         notation=_NOTATION if found.gap else (),
     )
 
@@ -134,23 +115,10 @@ def _parameters(found: GapReport) -> ReportTable | None:
 
 
 def _tables(found: GapReport) -> Iterator[ReportTable]:
-    if found.status in _WITH_SUSPECTS and found.suspects:
+    if found.suspects:
         yield _suspects(found)
     if found.gap:
         yield _sizes(found)
-    if found.effects:
-        yield ReportTable(
-            "Added effects",
-            [
-                Column("effect", [e.name for e in found.effects]),
-                Column("probability", [e.probability for e in found.effects], digits=3),
-                Column("sigma apart", [e.separating_snr for e in found.effects], digits=3),
-                Column("most similar", [e.nearest_rival for e in found.effects]),
-                Column("alternatives", [", ".join(e.alternatives) for e in found.effects]),
-            ],
-            "Sigma that distinguish the effect from the soil and from the most similar effect; "
-            f"probability of a gap {found.gap_probability:.2f}.",
-        )
     if any(d.after_sigma > 0.0 for d in found.discrepancy.values()):
         yield _discrepancy(found)
     if found.next_runs:
@@ -167,39 +135,29 @@ def _tables(found: GapReport) -> Iterator[ReportTable]:
             ],
             "Distances in standard deviations of what such tests scatter from place to place.",
         )
-    if found.candidates:
-        shown = found.candidates[:_CANDIDATES]
-        yield ReportTable(
-            "Candidates",
-            [
-                Column("effects", [" + ".join(c.effects) for c in shown]),
-                Column("gain", [c.achieved_gain for c in shown]),
-                Column("excess over the best", [c.excess for c in shown], digits=3),
-                Column("verdict", [c.verdict.text for c in shown]),
-            ],
-            "Gain: decrease of -2 ln of the posterior probability.",
-        )
     if found.variance_components:
         yield _components(found)
 
 
 def _suspects(found: GapReport) -> ReportTable:
+    """The likeliest explanations, those that are claimed first."""
     shown = found.suspects[:_LISTED]
     given = ", and if ".join(texts(found.conditions))
+    gains = [np.nan if s.predictive_gain is None else s.predictive_gain for s in shown]
     columns = [
         Column("effects", [" + ".join(s.effects) for s in shown]),
         Column("probability", [s.probability for s in shown], digits=2),
         Column("ln(odds)", [s.log_odds for s in shown], digits=3),
-        Column(
-            "ln(density kept back)",
-            [np.nan if s.predictive_gain is None else s.predictive_gain for s in shown],
-            digits=3,
-        ),
+        Column("ln(density kept back)", gains, digits=3),
     ]
     if any(s.times_usual for s in shown):
-        columns.append(Column("needs", [needed_sizes(s) for s in shown]))
-    note = f"Probabilities are valid if {given}." if given else ""
-    return ReportTable("Suspects", columns, note)
+        columns.append(Column("needs", [needed_sizes(s.times_usual) for s in shown]))
+    note = (
+        f"Probability of a gap {found.gap_probability:.2f}, of a cause outside the catalogue "
+        f"{found.outside_probability:.2f}."
+    )
+    note += f" Probabilities are valid if {given}." if given else ""
+    return ReportTable("Explanations", columns, note)
 
 
 def _sizes(found: GapReport) -> ReportTable:
@@ -229,7 +187,7 @@ def _sizes(found: GapReport) -> ReportTable:
     columns.append(Column("readings", [part.readings for part in parts]))
     columns.append(Column("what", [part.description for part in parts]))
     note = "Mean squared residual in sigma; noise alone gives 1. Blank: not smaller after."
-    return ReportTable("Size of the gap", columns, note)
+    return ReportTable("Figures of the gap", columns, note)
 
 
 def _discrepancy(found: GapReport) -> ReportTable:

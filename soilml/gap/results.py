@@ -11,7 +11,6 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.fitted_readings import FittedReadings
 from soilml.physics.soils.soil_tests import deviations
-from soilml.quantities import CHANNELS
 from soilml.remarks import Remark
 from soilml.report.numbers import format_residual
 from soilml.results import EstimatedValue, Result
@@ -37,8 +36,6 @@ class NamedEffect:
     name: str
     parameters: dict[str, EstimatedValue]
     alternatives: tuple[str, ...]  # effects of the other explanations that the data do not reject
-    separating_snr: float  # sigma between it, at its size, and the soil and its nearest rival
-    nearest_rival: str
     probability: float  # that it is present
     log_odds: float  # natural logarithm
 
@@ -86,7 +83,6 @@ class RemainderCause:
 
     stage: str  # a key of `_STAGES`, or the one channel that has it: a force or a sensor
     depends_on: str  # the quantity of which it is a smooth function; empty where unknown
-    channels: tuple[str, ...]  # whose readings it changes by more than half of their noise
     #: That the remainder acts at this stage, all others, several causes together and unknown ones
     #: included: at most 0.95
     probability: float
@@ -95,24 +91,19 @@ class RemainderCause:
     beside: tuple[str, ...] = ()  # effects beside which the remainder is left
 
     def remark(self) -> Remark:
-        """The description in one or two sentences.
+        """The description in a sentence.
 
-        >>> found = RemainderCause("normal stress", "load", ("torque", "sinkage"), 0.96, 4.2)
-        >>> print(found.remark())
+        >>> print(RemainderCause("normal stress", "load", 0.96, 4.2).remark())
         The remainder beside the soil alone looks like a change of the normal stress that depends on
-        load. Torque and sinkage share it.
+        load.
         """
-        alone, own = self.stage in CHANNELS, self.stage.replace("_", " ")
-        depends = shared = ""
+        own, depends = self.stage.replace("_", " "), ""
         if self.depends_on:
             depends = f" that depends on {_VARIABLES.get(self.depends_on, self.depends_on)}"
         what = f"an error of the {own} alone, of a force or of its sensor{',' if depends else ''}"
-        if not alone and len(self.channels) > 1:
-            *first, last = (channel.replace("_", " ") for channel in self.channels)
-            shared = f" {', '.join(first).capitalize()} and {last} share it."
         beside = " + ".join(self.beside) or "the soil alone"
         text = f"The remainder beside {beside} looks like {_STAGES.get(self.stage, what)}{depends}."
-        return Remark("remainder-cause", text + shared, (self.stage,), "note")
+        return Remark("remainder-cause", text, (self.stage,), "note")
 
 
 @dataclass(frozen=True)
@@ -145,16 +136,6 @@ class GapReduction:
         """Whether it is smaller after, at the digits that are shown."""
         shown = [format_residual(x) for x in (self.before, self.after)]
         return self.after < self.before and shown[0] != shown[1]
-
-
-@dataclass(frozen=True)
-class CandidateSummary:
-    """A fitted set of effects: the decrease of -2 ln p that it achieves, and its verdict."""
-
-    effects: tuple[str, ...]
-    achieved_gain: float
-    excess: float  # -2 ln p above that of the best candidate
-    verdict: Remark
 
 
 @dataclass(frozen=True)
@@ -192,17 +173,6 @@ class NoiseAgreement:
 
 
 @dataclass(frozen=True)
-class SoilTrend:
-    """A trend of the soil along the order of the runs, or of the rows of each run."""
-
-    order: str  # runs or rows
-    parameter: str
-    z: float  # score in standard deviations, positive where the soil becomes stronger
-    p: float  # family-wise p value among all scores of the soil alone
-    change: float  # of the parameter from the first run, or row, to the last: rad, or relative
-
-
-@dataclass(frozen=True)
 class SoilTestAgreement:
     """A plate or shear test, and the same quantity by the soil before and after.
 
@@ -218,21 +188,6 @@ class SoilTestAgreement:
     sigma_after: float
 
 
-#: Status of a report, and its meaning.
-STATUSES = {
-    "no-gap": "model and measurements agree within the noise",
-    "named": "exactly one explanation of the catalogue accounts for the gap",
-    "partly-named": "the evidence supports these effects; a smooth remainder is left unexplained",
-    "class": "several explanations account for the gap; these runs cannot distinguish them",
-    "form-open": "one effect accounts for the gap, with a law that differs from the catalogue's",
-    "suspected": "ranked suspects: no cause can be named",
-    "unknown": "there is a gap that no effect explains better than a smooth error",
-    "undecided": "measurements disagree with each other more than their noise allows",
-    "not-testable": "there is a gap, but these runs cannot identify its cause",
-    "bad-data": "the data cannot be analysed",
-}
-
-
 @dataclass(frozen=True, repr=False)
 class GapReport(Result):
     """The result of a gap analysis, made by `soilml.gap.gap`.
@@ -240,7 +195,7 @@ class GapReport(Result):
     Attributes
     ----------
     status : str
-        One of `STATUSES`.
+        A key of `soilml.gap.STATUSES`.
     sentence : str
         The verdict in at most 25 words, without names of runs.
     lines : tuple of Remark
@@ -255,9 +210,10 @@ class GapReport(Result):
     probabilities, gap_probability, remainder_probability : dict of float, float, float
         Posterior probabilities: of each tested effect, of a gap, of a smooth discrepancy beside
         what is shown.
+    outside_probability : float
+        That there is a gap with a cause which no effect of the catalogue describes.
     suspects, conditions : tuple of Suspect, tuple of Remark
-        Explanations with their odds, which are valid under `conditions`: the likeliest first, or
-        the likeliest of usual size where that has a probability of at least 0.005.
+        Explanations with their odds, which are valid under `conditions`, the likeliest first.
     discrepancy : dict of RemainingDiscrepancy
         Smooth discrepancy of each channel before and after, by column.
     remainder_cause : RemainderCause, optional
@@ -274,10 +230,8 @@ class GapReport(Result):
         A part whose figure did not shrink is left out, with a note.
     soil_before, soil_after : dict of EstimatedValue
         Soil parameters without and with the added effects.
-    mimic_radius : float
-        Largest cosine between the signature of an added effect and that of another one.
-    next_runs, candidates : tuple of NextRun, tuple of CandidateSummary
-        Proposed runs and checks, the most discriminating first; what was fitted, the best first.
+    next_runs : tuple of NextRun
+        Proposed runs and checks, the most discriminating first.
     untestable : dict of Remark
         Why these runs cannot test an effect, by its name.
     notes, not_claimed : tuple of Remark
@@ -286,8 +240,6 @@ class GapReport(Result):
         Estimated noise scales, run-to-run standard deviations and autocorrelation.
     misfit : NoiseAgreement, optional
         Residuals of the soil alone under the declared noise, and with scatter.
-    trends : tuple of SoilTrend
-        Trends of the soil with the order of runs and rows, the most significant first.
     """
 
     status: str
@@ -307,17 +259,15 @@ class GapReport(Result):
     gap: dict[str, GapReduction] = field(default_factory=dict)
     soil_before: dict[str, EstimatedValue] = field(default_factory=dict)
     soil_after: dict[str, EstimatedValue] = field(default_factory=dict)
-    mimic_radius: float = 0.0
     next_runs: tuple[NextRun, ...] = ()
-    candidates: tuple[CandidateSummary, ...] = ()
     untestable: dict[str, Remark] = field(default_factory=dict)
     notes: tuple[Remark, ...] = ()
     not_claimed: tuple[Remark, ...] = ()
     variance_components: dict[str, float] = field(default_factory=dict)
     misfit: NoiseAgreement | None = None
-    trends: tuple[SoilTrend, ...] = ()
     gap_probability: float = 0.0
     remainder_probability: float = 0.0
+    outside_probability: float = 0.0
     seed: int = 0
     curves: FittedReadings | None = field(default=None, metadata=ELSEWHERE)
 

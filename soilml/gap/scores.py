@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,6 +39,13 @@ def family_wise_p(z: float, count: int) -> float:
     return max(float(p), float(np.finfo(float).tiny))
 
 
+def chi_square_tail(value: float, degrees_of_freedom: float) -> float:
+    """Probability that a chi-square variable is above a value."""
+    from scipy.special import chdtrc
+
+    return float(chdtrc(degrees_of_freedom, value))
+
+
 @dataclass(frozen=True)
 class SignatureSimilarity:
     """Norms (sigma) and cosines of the catalogue's signatures, with the soil projected out."""
@@ -69,10 +76,3 @@ class SignatureSimilarity:
         rival = int(np.argmax(self.cosine[i]))
         sine = float(np.sqrt(max(0.0, 1.0 - self.cosine[i, rival] ** 2)))
         return abs(size) * float(self.norm[i]) * sine, self.names[rival]
-
-    def largest_cosine(self, names: Sequence[str]) -> float:
-        """Largest cosine between the signature of one of these effects and that of another."""
-        chosen = np.isin(self.names, names)
-        if not chosen.any() or chosen.all():
-            return 0.0
-        return float(self.cosine[chosen][:, ~chosen].max())

@@ -1,7 +1,7 @@
-"""The verdict of a gap report in words, and the conclusions that it does not support.
+"""The verdict of a gap report in words: the headline, and the lines below it.
 
-The headline and the lines below it are what all outputs say: terminal, page, JSON and live page.
-They name no runs; those stand in the reasons, the notes and the tables.
+They are what all outputs say: terminal, page, JSON and live page. They name no runs; those stand in
+the reasons, the notes and the tables.
 """
 
 from __future__ import annotations
@@ -9,14 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from string import Formatter
 
 from soilml.fitting.misfit import excess_residuals
-from soilml.gap.results import GapReport, NextRun, NoiseAgreement, Suspect
-from soilml.physics.effects import EFFECTS
+from soilml.gap.results import GapReport, NextRun, NoiseAgreement
+from soilml.gap.statuses import STATUSES
 from soilml.quantities import COLUMNS
 from soilml.remarks import Remark
 from soilml.report.numbers import (
     LEAST_STATED,
+    capitalised,
     channel_name,
     decimal,
     format_probability,
@@ -31,14 +33,10 @@ REASON_WORDS = 12  # Words of a reason without a name that stands in a headline 
 SENTENCE_WORDS = 30  # Words of a sentence, at most
 LEFT_FOR_OTHERS = 3  # Words of a sentence that are left for how many others there are
 SUSPECTS_IN_LINE = 3  # Suspects that a line lists
-UNLIKELY_SUSPECT = 0.1  # Probability of the first suspect below which the headline doubts it
 HARDLY = 0.95  # Share of a gap that is left, above which it hardly shrinks
 LIKE_NOISE = 1.3  # Mean squared residual below which a gap is no matter of its size
 NOTABLE_DISCREPANCY = 0.3  # Discrepancy in sigma from which a line states it
-#: Logarithm of odds below which they are called even, and the largest odds that are stated.
-EVEN_ODDS, MOST_ODDS = 0.1, 10_000
-#: Probability of the likeliest of a class below which a line says that none of it may be the cause.
-DOUBTED_CLASS = 0.5
+NOTABLE_OUTSIDE = 0.05  # Probability of a cause outside the catalogue from which a line states it
 
 #: What a headline says of residuals beyond the declared noise without a smooth gap, by the reason.
 _BEYOND_NOISE = {
@@ -52,7 +50,6 @@ _BEYOND_NOISE = {
 _IN_SHORT = {
     "noise-scaled": "readings scatter more than their noise",
     "runs-differ": "runs differ like different soils",
-    "repeats-disagree": "repeats differ by more than their noise",
     "region-not-predicted": "one region is not predicted by the other rows",
     "soil-test": "rows and tests of the soil disagree",
     "excess-residuals": "residuals exceed the declared noise",
@@ -85,111 +82,32 @@ def short_reason(reason: Remark) -> str:
 
 
 def headline(report: GapReport) -> str:
-    """The verdict in at most `HEADLINE_WORDS` words.
+    """The verdict in at most `HEADLINE_WORDS` words, by the template of its status.
 
     It says whether there is a gap, the first effect, by how much the gap shrinks, and how sure that
     is.
     """
-    why = "; ".join(map(short_reason, report.reasons[:1]))
-    train = report.gap.get("train")
-    match report.status:
-        case "bad-data":
-            return _faults(report)
-        case "no-gap":
-            return _no_gap(report)
-        case "undecided":
-            code = report.reasons[0].code if report.reasons else ""
-            if (found := report.misfit) and code in _BEYOND_NOISE:
-                return f"{_excess(found).capitalize()}{_BEYOND_NOISE[code]}."
-            return f"No smooth gap was found, but the measurements disagree: {why}."
-        case "not-testable":
-            return f"There is a gap, but these runs cannot identify its cause: {why}."
-        case "unknown":
-            faults = [r for r in report.reasons if r.code == "implausible-fault"]
-            which = " that no effect explains better than a smooth error"
-            if faults:
-                which = f", which only an implausibly large {' + '.join(faults[0].about)} explains"
-            before = "unknown" if train is None else format_residual(train.before)
-            size = f"mean squared residual {before}; noise alone gives 1"
-            if train is not None and train.before < LIKE_NOISE:
-                size = "residuals form a pattern that noise does not"
-            sure = f"probability {format_probability(report.gap_probability)}"
-            return f"There is a gap{which} ({size}; {sure})."
-        case "suspected":
-            return _suspected(report)
-    names = " + ".join(e.name for e in report.effects)
-    chance = min((e.probability for e in report.effects), default=math.nan)
-    sure = f" (probability {format_probability(chance)})" if math.isfinite(chance) else ""
-    end = f"{names}{sure}{_shrinks(report)}."
-    if report.status == "class" and chance < UNLIKELY_SUSPECT:
-        return f"No effect is likely; the first of {len(report.cause_set)} explanations is {end}"
-    if report.status == "class":
-        begin = f"Missing effect: one of {len(report.cause_set)} explanations, likeliest "
-        first = report.suspects[0] if report.suspects else None
-        members = {name for own in report.cause_set for name in own}
-        if first and first.probability > chance and not members & set(first.effects):
-            also = f" ({format_probability(first.probability)}){_shrinks(report)}."
-            longer = f"{begin}{names}{sure}, maybe beside {' + '.join(first.effects)}{also}"
-            if len(longer.split()) <= HEADLINE_WORDS:
-                return longer
-        return f"{begin}{end}"
-    if report.status == "partly-named":
-        return f"Missing effect, among others: {end}"
-    law = ", by another law than the catalogue's" if report.status == "form-open" else ""
-    return f"Missing effect: {names}{law}{sure}{_shrinks(report)}."
+    template = STATUSES[report.status].headline
+    used = {name for _, name, _, _ in Formatter().parse(template) if name}
+    return template.format(**{name: _WORDS[name](report) for name in used})
 
 
-def _suspected(report: GapReport) -> str:
-    """The first suspect, how sure it is, and by how much the gap shrinks."""
-    if not report.suspects:
-        names = " + ".join(report.best_unclaimed)
-        return f"Cause not certain: first suspect is {names}{_shrinks(report)}."
-    first = report.suspects[0]
-    begin = "first suspect is"
-    if likelier_than_first(report.suspects):
-        begin = "first suspect of usual size is"
-    elif first.probability < UNLIKELY_SUSPECT and not first.times_usual:
-        begin = "no effect is likely, the first is"
-    sure = f"probability {format_probability(first.probability)}"
-    sure += ", implausibly large" if first.times_usual else ""
-    names = " + ".join(report.best_unclaimed or first.effects)
-    return f"Cause not certain: {begin} {names} ({sure}){_shrinks(report)}."
+def _names(report: GapReport) -> str:
+    """The effects that are claimed, else the first suspect."""
+    if report.effects:
+        return " + ".join(e.name for e in report.effects)
+    first = report.best_unclaimed or (report.suspects[0].effects if report.suspects else ())
+    return " + ".join(first)
 
 
-def _faults(report: GapReport) -> str:
-    """The first fault, if it can be said shortly, and how many there are."""
-    count = len(report.reasons)
-    more = f"; {count - 1} more fault{'s' if count > 2 else ''}" if count > 1 else ""
-    text = report.reasons[0].text + more
-    if len(text.split()) <= HEADLINE_WORDS:
-        return text
-    return f"{count} fault{'s' if count > 1 else ''} in the data or the model file."
-
-
-def _no_gap(report: GapReport) -> str:
-    declared = report.model.discrepancy
-    p = f"probability of a gap {format_probability(report.gap_probability)}."
-    if report.misfit is not None and report.misfit.grants_scatter:
-        beside = " and declared discrepancy" if declared else ""
-        return f"No gap beyond noise{beside}, with {_scatter(report.misfit)}: {p}"
-    beside = " and the declared discrepancy" if declared else ""
-    residual = format_residual(report.gap["train"].before, 2)
-    return (
-        f"Model and measurements agree within the noise{beside}: mean squared residual "
-        f"{residual}, {p}"
-    )
-
-
-def _excess(found: NoiseAgreement) -> str:
-    return excess_residuals(math.sqrt(found.declared), found.with_discrepancy)
-
-
-def _scatter(found: NoiseAgreement) -> str:
-    """The scatter that the soil is granted, with its size."""
-    angle = math.degrees(found.friction_angle_std)
-    parts = [f"{decimal(angle, 2)} deg"] if angle > 0.0 else []
-    parts += [f"{100.0 * found.bearing_std:.2g} %"] if found.bearing_std > 0.0 else []
-    return f"a scatter of {' and '.join(parts)} from run to run"
+def _sure(report: GapReport) -> str:
+    """The probability of what is named, as the middle of a sentence."""
+    chances = [e.probability for e in report.effects]
+    large = ""
+    if not chances and report.suspects:
+        chances = [report.suspects[0].probability]
+        large = ", implausibly large" if report.suspects[0].times_usual else ""
+    return f" (probability {format_probability(min(chances))}{large})" if chances else ""
 
 
 def _shrinks(report: GapReport) -> str:
@@ -204,45 +122,120 @@ def _shrinks(report: GapReport) -> str:
     return f"; the gap {hardly}shrinks {before} -> {after}"
 
 
-def likelier_than_first(suspects: Sequence[Suspect]) -> list[Suspect]:
-    """The suspects that are likelier than the first, which they follow for their sizes."""
-    return [s for s in suspects[1:] if s.log_odds > suspects[0].log_odds]
+def _why(report: GapReport) -> str:
+    return "; ".join(map(short_reason, report.reasons[:1]))
 
 
-def needed_sizes(suspect: Suspect) -> str:
-    """The implausible sizes that a suspect needs, in words; empty where it needs none."""
-    sizes = suspect.times_usual.items()
+def _which(report: GapReport) -> str:
+    """Which gap an unknown one is."""
+    faults = [r for r in report.reasons if r.code == "implausible-fault"]
+    if faults:
+        return f", which only an implausibly large {' + '.join(faults[0].about)} explains"
+    return " that no effect explains better than a smooth error"
+
+
+def _size(report: GapReport) -> str:
+    train = report.gap.get("train")
+    if train is not None and train.before < LIKE_NOISE:
+        return "residuals form a pattern that noise does not"
+    before = "unknown" if train is None else format_residual(train.before)
+    return f"mean squared residual {before}; noise alone gives 1"
+
+
+def _disagreement(report: GapReport) -> str:
+    code = report.reasons[0].code if report.reasons else ""
+    if (found := report.misfit) and code in _BEYOND_NOISE:
+        return f"{capitalised(_excess(found))}{_BEYOND_NOISE[code]}."
+    return f"No smooth gap was found, but the measurements disagree: {_why(report)}."
+
+
+def _faults(report: GapReport) -> str:
+    """The first fault, if it can be said shortly, and how many there are."""
+    count = len(report.reasons)
+    more = f"; {count - 1} more fault{'s' if count > 2 else ''}" if count > 1 else ""
+    text = report.reasons[0].text + more
+    if len(text.split()) <= HEADLINE_WORDS:
+        return text
+    return f"{count} fault{'s' if count > 1 else ''} in the data or the model file."
+
+
+def _agreement(report: GapReport) -> str:
+    declared = report.model.discrepancy
+    p = f"probability of a gap {format_probability(report.gap_probability)}."
+    if report.misfit is not None and report.misfit.grants_scatter:
+        beside = " and declared discrepancy" if declared else ""
+        return f"No gap beyond noise{beside}, with {_scatter(report.misfit)}: {p}"
+    beside = " and the declared discrepancy" if declared else ""
+    residual = format_residual(report.gap["train"].before, 2)
+    return (
+        f"Model and measurements agree within the noise{beside}: mean squared residual "
+        f"{residual}, {p}"
+    )
+
+
+#: What stands in the templates of `STATUSES`.
+_WORDS = {
+    "names": _names,
+    "sure": _sure,
+    "shrinks": _shrinks,
+    "why": _why,
+    "which": _which,
+    "size": _size,
+    "count": lambda report: len(report.cause_set),
+    "gap": lambda report: format_probability(report.gap_probability),
+    "disagreement": _disagreement,
+    "faults": _faults,
+    "agreement": _agreement,
+}
+
+
+def _excess(found: NoiseAgreement) -> str:
+    return excess_residuals(math.sqrt(found.declared), found.with_discrepancy)
+
+
+def _scatter(found: NoiseAgreement) -> str:
+    """The scatter that the soil is granted, with its size."""
+    angle = math.degrees(found.friction_angle_std)
+    parts = [f"{decimal(angle, 2)} deg"] if angle > 0.0 else []
+    parts += [f"{100.0 * found.bearing_std:.2g} %"] if found.bearing_std > 0.0 else []
+    return f"a scatter of {' and '.join(parts)} from run to run"
+
+
+def needed_sizes(times_usual: dict[str, float]) -> str:
+    """Implausible sizes that an explanation needs, in words; empty where it needs none."""
+    sizes = times_usual.items()
     return " and ".join(f"{name} at {decimal(x, 2)} times its usual size" for name, x in sizes)
 
 
 def listed_explanations(report: GapReport) -> str:
-    """The explanations that remain, in the order of the report; suspects with their odds.
+    """The explanations that remain, the likeliest first, and whether the cause may be none of them.
 
-    Suspects whose probability is only a bound stand in the table alone. Of a class, a line says
-    where the cause may be none of it.
+    Suspects have their probabilities; one whose probability is only a bound stands in the table
+    alone.
     """
+    if report.status not in ("suspected", "class", "unknown"):
+        return ""
     if report.status == "class":
         begin = "These runs cannot distinguish, the likeliest first:"
         sets = [" + ".join(names) for names in report.cause_set]
         kept = sets[: _fitting(begin, [f"or {names}" for names in sets])]
         if left := len(sets) - len(kept):
             kept.append(f"{left} other{'s' if left > 1 else ''}")
-        sensors = all(
-            n in EFFECTS and EFFECTS[n].about.kind == "sensor" for n in report.cause_set[0]
-        )
-        doubted = sensors or any(e.probability < DOUBTED_CLASS for e in report.effects)
-        outside = " A cause outside the catalogue is possible." if doubted else ""
-        return f"{begin} {', or '.join(kept)}.{outside}"
-    stated = [s for s in report.suspects if s.probability >= LEAST_STATED][:SUSPECTS_IN_LINE]
-    if not stated:
-        return ""
-    likelier = likelier_than_first(report.suspects)
-    order = "the likeliest of usual size first" if likelier else "the likeliest first"
-    begin = f"Suspects, {order}, within the catalogue:"
-    parts = [f"{' + '.join(s.effects)} ({_odds(s.log_odds)})" for s in stated]
-    listed = "; ".join(parts[: _fitting(begin, parts)])
-    why = [f" {' + '.join(s.effects)} is likelier, but needs {needed_sizes(s)}." for s in likelier]
-    return f"{begin} {listed}.{''.join(why)}"
+        said = f"{begin} {', or '.join(kept)}."
+    elif report.status == "suspected":
+        stated = [s for s in report.suspects if s.probability >= LEAST_STATED][:SUSPECTS_IN_LINE]
+        if not stated:
+            return ""
+        begin = "Suspects, the likeliest first, with their probabilities:"
+        parts = [f"{' + '.join(s.effects)} ({decimal(s.probability, 2)})" for s in stated]
+        said = f"{begin} {'; '.join(parts[: _fitting(begin, parts)])}."
+        if needed := needed_sizes(stated[0].times_usual):
+            said += f" The first needs {needed}."
+    else:
+        said = ""
+    if (outside := report.outside_probability) >= NOTABLE_OUTSIDE:
+        said += f" Probability that the catalogue lacks the cause: {decimal(outside, 2)}."
+    return said.strip()
 
 
 def _fitting(begin: str, parts: Sequence[str]) -> int:
@@ -254,16 +247,6 @@ def _fitting(begin: str, parts: Sequence[str]) -> int:
             break
         count += 1
     return count
-
-
-def _odds(log_odds: float) -> str:
-    """Odds against all other explanations, in words."""
-    if abs(log_odds) < EVEN_ODDS:
-        return "even odds"
-    number = f"more than {MOST_ODDS}"
-    if abs(log_odds) <= math.log(MOST_ODDS):
-        number = decimal(math.exp(abs(log_odds)), 2)
-    return f"odds {number} to 1" if log_odds >= 0.0 else f"odds 1 to {number}"
 
 
 def next_run_in_words(run: NextRun) -> str:
@@ -293,15 +276,12 @@ def report_lines(report: GapReport, model_effects: Sequence[str] = ()) -> tuple[
         why = report.reasons or ((NOT_DECISIVE,) if report.status == "suspected" else ())
         text = _in_sentences("Why no cause is named", [short_reason(reason) for reason in why])
         lines += [Remark("why", text)] if why else []
-    if report.status in ("suspected", "class") and (listed := listed_explanations(report)):
+    if listed := listed_explanations(report):
         lines.append(Remark("suspects", listed))
     if left := _remainder(report):
         lines.append(Remark("left", left))
-    lines += [
-        replace(note, text=f"{note.text[:1].upper()}{note.text[1:]}.")
-        for note in report.notes
-        if note.code == "hidden-effect"
-    ]
+    hidden = [note for note in report.notes if note.code == "hidden-effect"]
+    lines += [replace(note, text=f"{capitalised(note.text)}.") for note in hidden]
     if report.next_runs:
         lines.append(Remark("next", next_run_in_words(report.next_runs[0])))
     if len(lines) > MOST_LINES:  # the headline and the notes have figures of what was tried
@@ -315,7 +295,7 @@ def _in_sentences(begin: str, parts: Sequence[str]) -> str:
     for i, part in enumerate(dict.fromkeys(parts)):
         longer = f"{sentences[-1]}{';' if i else ''} {part}"
         if i and len(longer.split()) > SENTENCE_WORDS:
-            sentences.append(f"{part[:1].upper()}{part[1:]}")
+            sentences.append(capitalised(part))
         else:
             sentences[-1] = longer
     return f"{'. '.join(sentences)}."
@@ -332,8 +312,6 @@ def _tried(report: GapReport, model_effects: Sequence[str]) -> Remark:
             text += f", {math.sqrt(found.granted):.1f} times with {_scatter(found)}"
         without = f"without {'it' if count == 1 else 'them'}, " if count else ""
         sentences.append(f"{without}{text}")
-    if count := len(report.candidates):
-        parts.append(f"{count} explanation{'s were' if count > 1 else ' was'} fitted")
     if report.untestable:
         parts.append(f"{len(report.untestable)} effects cannot be tested by these runs")
     parts += [
@@ -341,7 +319,7 @@ def _tried(report: GapReport, model_effects: Sequence[str]) -> Remark:
     ]
     sentences += ["; ".join(parts)] if parts else []
     sentences = sentences or ["the soil alone was fitted"]
-    return Remark("tried", " ".join(f"{text[:1].upper()}{text[1:]}." for text in sentences))
+    return Remark("tried", " ".join(f"{capitalised(text)}." for text in sentences))
 
 
 def outliers_in_words(count: int) -> str:
@@ -372,5 +350,5 @@ def _remainder(report: GapReport) -> str:
     text += f" Its root mean square: {', '.join(parts)}."
     worst, largest = max(left.items(), key=lambda item: item[1].after_sigma)
     if where := largest.description:
-        text += f" {channel_name(worst).capitalize()} is {where}."
+        text += f" {capitalised(channel_name(worst))} is {where}."
     return f"{text} {cause}".rstrip()

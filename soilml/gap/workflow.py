@@ -8,19 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.config.case import Case
-from soilml.config.compatibility import check_wheel_size
 from soilml.config.given_case import GivenCase, as_case
 from soilml.config.remainder import SAME_ROWS
 from soilml.errors import InputError, solvable
 from soilml.fitting.candidate_effects import candidate_effects, effect_names
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
-from soilml.fitting.faulty_readings import sound_rows
 from soilml.fitting.fitted_readings import FittedReadings
-from soilml.fitting.operating_points import with_rover_columns
 from soilml.fitting.predictions import forces
 from soilml.fitting.readings import Readings, stack_readings
-from soilml.fitting.row_order import with_order_columns
-from soilml.fitting.usable_readings import answered_rows, with_zeros_replaced
+from soilml.fitting.usable_readings import prepared_rows, with_zeros_replaced
 from soilml.gap.cause_of_remainder import described_cause
 from soilml.gap.checks import ONE_LOAD, estimate_repeat_noise, faults_of, naming_obstacles
 from soilml.gap.conclusions import (
@@ -37,10 +33,8 @@ from soilml.gap.disagreements import (
     unpredicted_rows,
 )
 from soilml.gap.estimates import (
-    candidate_summaries,
     named_effects,
     returned_case,
-    signature_similarity,
     soil_after,
     soil_before,
     variance_component_entries,
@@ -58,9 +52,7 @@ from soilml.gap.held_out import (
 )
 from soilml.gap.next_runs import competing_explanations, next_runs
 from soilml.gap.notes import analysis_notes, hidden_effect, outlier_names
-from soilml.gap.order_trend import order_trends, trend_remarks
 from soilml.gap.remainder import discrepancy_map, remaining_discrepancy
-from soilml.gap.repeats import repeats_that_disagree
 from soilml.gap.results import GapReport
 from soilml.gap.run_options import check_costs, rank_by_cost
 from soilml.gap.sentences import headline, report_lines
@@ -165,13 +157,10 @@ def gap(
     effects = candidate_effects(case, effects)
     case = case.without_learned_discrepancy().without_explanations()
     known_costs = check_costs(costs or {})
-    table, copies = sound_rows(case, as_table(table))
+    table, remarks = prepared_rows(case, as_table(table), FROM_ORDER)
     known, case = case.remainder, case.without_remainder_of(table)
-    copies += () if case.remainder is known else (SAME_ROWS,)
-    table = with_rover_columns(case, with_order_columns(case, table, FROM_ORDER))
-    check_wheel_size(case, table)
+    remarks += [] if case.remainder is known else [SAME_ROWS]
     _check_size(table)
-    table, excluded_rows = answered_rows(table)
     split = split_holdout(table, holdout, seed)
     soil = free_soil_parameters(case, free)
 
@@ -179,7 +168,7 @@ def gap(
     readings = with_zeros_replaced(case, split.analysed, readings, refuse=False)
     repeat_noise, notes = estimate_repeat_noise(readings)
     readings, exclusions = readings.with_default_std(repeat_noise).with_known_noise()
-    notes = [*copies, *notes, *readings.notes, *exclusions, *excluded_rows]
+    notes = [*remarks, *notes, *readings.notes, *exclusions]
     if faults := tuple(faults_of(readings, len(soil))):
         return _bad_data_report(case, faults, notes, seed)
     obstacles = tuple(naming_obstacles(readings, len(soil)))
@@ -250,74 +239,64 @@ def _build_report(
     naming: Why the rows cannot identify a cause.
     """
     gains = predictive_gains(posterior, ranked_sets(posterior)[:SCORED], seed)
-    quiet = posterior.no_gap > constants.NO_GAP
+    quiet = posterior.no_gap > constants.LIKELIER
     alone, _ = plain_fits(posterior, None)
     opened = opened_priors(posterior)
     obstacles = (*opened, *naming)
     agreement = noise_agreement(case, readings, posterior, alone)
-    trends = order_trends(posterior, seed)
-    drift, conflicts = trend_remarks(trends), list[Remark]()
+    kept_back = held_out if held_out is not None and len(held_out) else None
+    conflicts = list[Remark]()
     if quiet:
-        conflicts = [*drift, *misfit_remarks(agreement, case, posterior, alone)]
+        conflicts = misfit_remarks(agreement, case, posterior, alone)
         conflicts += disagreements(posterior)
         conflicts += unexplained_figures(gap_reductions(posterior, (alone, alone), seed))
-        if held_out is not None and len(held_out):
-            conflicts += unpredicted_rows(posterior, held_out, split.description)
+        if kept_back is not None:
+            conflicts += unpredicted_rows(posterior, kept_back, split.description)
     decision = decide(posterior, gains, obstacles, conflicts)
     if decision.status == "undecided" and not quiet:
         conflicts = list(opened)
     shown = decision.shown
     fits = plain_fits(posterior, shown)
     figures = gap_reductions(posterior, fits, seed)
-    if held_out is not None and len(held_out):
-        figures[split.name] = predict_held_out(posterior, fits, held_out, split.description)
-    figures, not_reduced = without_grown(
-        figures, " + ".join(shown.hypothesis.effects) if shown else ""
-    )
+    if kept_back is not None:
+        figures[split.name] = predict_held_out(posterior, fits, kept_back, split.description)
+    added = " + ".join(shown.hypothesis.effects) if shown else ""
+    figures, not_reduced = without_grown(figures, added)
     smooth_gap = decision.status not in ("no-gap", "undecided")
     whole = whole_answer(posterior, decision)
     written = whole or shown or posterior.soil
-    replicates = repeats_that_disagree(posterior, written.fit) if smooth_gap else []
     listed = suspects(posterior, decision, gains) if smooth_gap else []
+    claimed = bool(decision.claimed) and shown is not None
     report = GapReport(
         status=decision.status,
         sentence="",
         model=returned_case(posterior, whole, seed),
+        effects=tuple(named_effects(posterior, decision)) if claimed else (),
         cause_set=decision.listed,
         probabilities={n: posterior.probability(n) for n in posterior.effects()},
         best_unclaimed=listed[0].effects if listed and not decision.claimed else (),
-        reasons=reasons(decision, obstacles, conflicts or replicates),
+        reasons=reasons(decision, obstacles, conflicts),
         gap=figures,
         soil_before=soil_before(alone),
         soil_after=soil_after(posterior, seed),
-        candidates=tuple(candidate_summaries(posterior, decision)),
         untestable=dict(posterior.untestable),
         notes=(
             *notes,
             *not_reduced,
             *analysis_notes(posterior, alone, written, split.analysed.place),
-            *(replace(r, text=f"replicate rows disagree: {r}") for r in replicates),
-            *(drift if smooth_gap else ()),
             *(hidden_effect(posterior, alone) if decision.status == "no-gap" else ()),
         ),
         variance_components=variance_component_entries(posterior),
         misfit=agreement,
-        trends=tuple(trends),
         gap_probability=1.0 - posterior.no_gap,
         remainder_probability=1.0 - (shown or posterior.soil).share_without,
+        outside_probability=posterior.outside,
         seed=seed,
         curves=FittedReadings.of_solutions(*fits, posterior.std),
     )
-    if decision.claimed and shown is not None:
-        similarity = signature_similarity(posterior, shown)
-        report = replace(
-            report,
-            effects=tuple(named_effects(posterior, decision, similarity)),
-            mimic_radius=similarity.largest_cosine(shown.hypothesis.effects),
-        )
     if not smooth_gap:
         return report
-    explained = shown if decision.claimed and shown is not None else posterior.soil
+    explained = shown if claimed and shown is not None else posterior.soil
     rivals = competing_explanations(posterior, decision, listed)
     return replace(
         report,

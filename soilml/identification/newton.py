@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,9 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate, rates_at, values_at
+from soilml.fitting.covariance import Whitening
+from soilml.fitting.damped_descents import EXACT, descend
+from soilml.fitting.least_squares import LeastSquaresProblem
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.identification.fit import Fit
@@ -21,18 +24,11 @@ from soilml.physics.soils import Soil
 from soilml.quantities import column
 from soilml.remarks import Remark
 
-STEPS, HALVINGS = 60, 12  # Most Newton steps, and most halvings of one
-#: Step, as a fraction of the search range, at which the iteration has converged; and the largest
-#: at which an iteration that finds no lower cost has.
-CONVERGED, STALLED = 1e-9, 1e-6
 LEAST_RATIO = 1e-6  # Least ratio of the singular values of the Jacobian
 #: Step of central differences, as a fraction of the search range: rounding errors of the
 #: equilibrium (1e-10 of a reading) and curvature then both stay below 1e-6 of a derivative.
 DIFFERENCE_STEP = 1e-4
 ASSUMED_NOISE = 0.02  # Noise, as a fraction of the reading, where none is declared
-
-#: Whitened residuals (k,) and Jacobian (k, 3) at fractions of the search ranges (3,).
-Linearised = Callable[[Floats], tuple[Floats, Floats]]
 
 
 def newton(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
@@ -41,9 +37,9 @@ def newton(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     .. math:: \theta \leftarrow \theta - (J^T J)^{-1} J^T r, \quad
         \theta = (\varphi, \ln K, \ln k), \quad k = k_c / b + k_\varphi
 
-    which for three readings is Newton-Raphson, for more Gauss-Newton; a step that increases the
-    cost is halved. There are no bounds from priors: where the rows do not determine all three
-    unknowns the iteration diverges, which is an error.
+    which for three readings is Newton-Raphson, for more Gauss-Newton, damped where a step increases
+    the cost. There are no bounds from priors: where the rows do not determine all three unknowns
+    the iteration ends at a bound of what any soil has, which is an error.
 
     Parameters
     ----------
@@ -80,12 +76,19 @@ def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     known = not readings.undeclared
     std = np.where(np.isfinite(declared), declared, ASSUMED_NOISE * np.abs(measured) + 1e-9)
 
-    def linearised(u: Floats) -> tuple[Floats, Floats]:
-        prediction, jacobian = _central_differences(case, readings, unknowns, u)
-        return (prediction - measured) / std, jacobian / std[:, None]
-
     start = np.asarray([f.prior.fraction(f.nominal) for f in unknowns])
-    u, residual, jacobian = _minimise(linearised, start)
+    whiten = Whitening.of(std, np.zeros((len(std), 0)))
+    found = descend(LeastSquaresProblem(case, unknowns, readings, whiten), start, EXACT)
+    u = found.x
+    if not np.isfinite(found.prediction).all():
+        raise FitError("Newton-Raphson left the range in which the wheel is carried")
+    if not found.converged or np.minimum(u, 1.0 - u).min() <= 0.0:
+        raise FitError(
+            "Newton-Raphson does not converge: the rows do not determine friction angle, shear "
+            "modulus and pressure-sinkage modulus together; use --method nonlinear"
+        )
+    prediction, jacobian = _central_differences(case, readings, unknowns, u)
+    residual, jacobian = (prediction - measured) / std, jacobian / std[:, None]
     _check_rank(jacobian)
     freedom = len(residual) - len(unknowns)
     misfit = float(residual @ residual / freedom) if freedom > 0 else float("nan")
@@ -137,40 +140,6 @@ def _unknowns(soil: Soil) -> list[Coordinate]:
         Coordinate("shear_modulus", "m", Prior(1e-4, 1.0, log=True), float(soil.shear_modulus)),
         Coordinate("kphi", "N/m^(n+2)", Prior(1e3, 1e9, log=True), float(soil.kphi)),
     ]
-
-
-def _minimise(linearised: Linearised, u: Floats) -> tuple[Floats, Floats, Floats]:
-    """Unknowns, whitened residuals and Jacobian at the minimum; raises `FitError` if none."""
-    residual, jacobian = linearised(u)
-    for _ in range(STEPS):
-        if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
-            raise FitError("Newton-Raphson left the range in which the wheel is carried")
-        step = np.asarray(np.linalg.lstsq(jacobian, -residual, rcond=1e-14)[0], dtype=np.float64)
-        lower = _line_search(linearised, u, step, float(residual @ residual))
-        if lower is None:
-            if np.abs(step).max() > STALLED:
-                raise FitError(
-                    "Newton-Raphson does not converge: the rows do not determine friction angle, "
-                    "shear modulus and pressure-sinkage modulus together; use --method nonlinear"
-                )
-            break
-        u, residual, jacobian = lower
-        if np.abs(step).max() < CONVERGED:
-            break
-    return u, residual, jacobian
-
-
-def _line_search(
-    linearised: Linearised, u: Floats, step: Floats, cost: float
-) -> tuple[Floats, Floats, Floats] | None:
-    """The first of the halved steps inside the search range that does not increase the cost."""
-    for halving in range(HALVINGS):
-        trial = u + step * 0.5**halving
-        if np.all((trial > 0) & (trial < 1)):
-            residual, jacobian = linearised(trial)
-            if residual @ residual <= cost:
-                return trial, residual, jacobian
-    return None
 
 
 def _check_rank(jacobian: Floats) -> None:

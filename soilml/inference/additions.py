@@ -20,9 +20,6 @@ from soilml.inference.problem import SOIL_ALONE, Hypothesis
 if TYPE_CHECKING:
     from soilml.inference.search import Search
 
-#: Distance from the ends of an opened prior at which a fit starts: one at a bound would stay there.
-OFF_BOUNDS = 0.02
-
 
 def additions(
     search: Search, node: Explanation, ladder: Sequence[Hyperparameters]
@@ -33,7 +30,7 @@ def additions(
     model = linear_model(search.terms, node.fit, node.outliers, extra)
     start = node.fit.start_values()
     found: dict[Hypothesis, Prediction] = {}
-    prior = constants.DISCREPANCY_PRIOR
+    prior = constants.EVEN_PRIOR
     for at in ladder:
         try:
             products, constant = model.reduced(at)
@@ -133,10 +130,9 @@ def _opened(
     if min(ends, default=1.0) >= constants.PRESSED and not large:
         return {}
     values = node.fit.values()
+    inside = constants.PRESSED, 1.0 - constants.PRESSED  # a start at a bound would stay there
     opened = {
-        c.path: float(
-            np.clip(c.prior.fraction(values.get(c.path, c.nominal)), OFF_BOUNDS, 1.0 - OFF_BOUNDS)
-        )
+        c.path: float(np.clip(c.prior.fraction(values.get(c.path, c.nominal)), *inside))
         for c in problem.wide_soil
     }
     wide = replace(h, wide_priors=True)

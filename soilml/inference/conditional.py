@@ -81,16 +81,9 @@ def conditional(model: LinearisedFit, at: Hyperparameters) -> Conditional:
     for a reading that is left out; noise that is correlated with that of others counts as
     independent there.
     """
-    terms, p = model.terms, len(model.x)
-    used, _, found = model.eliminated(at)
-    k = len(used)
-    scale = np.concatenate([np.sqrt(terms.variance(at)[used]), np.ones(p)])
-    matrix = scale[:, None] * found.left[:-1, :-1] * scale
-    matrix[np.arange(k), np.arange(k)] += 1.0
-    matrix[k:, k:] += np.diag(model.precision) + model.information
-    b = scale * found.left[:-1, -1]
-    b[k:] -= model.pull
-    covariance = np.linalg.inv(matrix)
+    terms = model.terms
+    used, _, found, scale, matrix, b = model.normal_equations(at)
+    covariance = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     mean = covariance @ b
     return Conditional(
         columns=np.column_stack([terms.columns[:, used], model.jacobian]) * scale,

@@ -153,6 +153,25 @@ class LinearisedFit:
         left = found.eliminated(np.exp(-2.0 * at.log[terms.groups :]), terms.scatter_std(at))
         return terms.without_scatter[used], found, left
 
+    def normal_equations(
+        self, at: Hyperparameters, order: Integers | None = None
+    ) -> tuple[Integers, Products, Eliminated, Floats, Floats, Floats]:
+        """What `eliminated` gives; scale (q,), matrix (q, q) and right-hand side (q,) of the rest.
+
+        Unknowns are the weights of the used columns in their standard deviations, `scale`, and then
+        the coordinates in an order.
+        """
+        used, products, left = self.eliminated(at, order)
+        k, p, total = len(used), len(self.x), left.left
+        order = np.arange(p) if order is None else order
+        scale = np.concatenate([np.sqrt(self.terms.variance(at)[used]), np.ones(p)])
+        matrix = scale[:, None] * total[:-1, :-1] * scale
+        matrix[np.arange(k), np.arange(k)] += 1.0
+        matrix[k:, k:] += (np.diag(self.precision) + self.information)[np.ix_(order, order)]
+        b = scale * total[:-1, -1]
+        b[k:] -= self.pull[order]
+        return used, products, left, scale, matrix, b
+
     def evaluate(self, at: Hyperparameters) -> Evaluation:
         """The model at some hyperparameters.
 
@@ -163,15 +182,9 @@ class LinearisedFit:
 
         terms, p, first = self.terms, len(self.x), self.terms.groups
         order = np.concatenate([np.flatnonzero(~self.held), np.flatnonzero(self.held)])
-        used, products, scatter = self.eliminated(at, order)
+        used, products, scatter, scale, matrix, b = self.normal_equations(at, order)
         total, counts, k = scatter.left, products.counts, len(used)
         free = k + int(np.count_nonzero(~self.held))
-        scale = np.concatenate([np.sqrt(terms.variance(at)[used]), np.ones(p)])
-        matrix = scale[:, None] * total[:-1, :-1] * scale
-        matrix[np.arange(k), np.arange(k)] += 1.0
-        matrix[k:, k:] += (np.diag(self.precision) + self.information)[np.ix_(order, order)]
-        b = scale * total[:-1, -1]
-        b[k:] -= self.pull[order]
         factor = np.linalg.cholesky(matrix)
         root, _ = dtrtri(factor, lower=1)
         half = root[:free, :free] @ b[:free]

@@ -19,6 +19,7 @@ from soilml.inference import constants
 from soilml.inference.draws import DRAWS, Component, Draws, Marginal, marginal, proposals, weighted
 from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import GaussianTerms, Hyperparameters
+from soilml.inference.priors import unknown_cause
 from soilml.inference.problem import SOIL_ALONE, Hypothesis, InferenceProblem
 from soilml.inference.search import Search
 from soilml.remarks import Remark
@@ -222,6 +223,26 @@ class Posterior:
         if np.sqrt(max(squares, default=0.0)) < constants.NEGLIGIBLE_DISCREPANCY:
             share = 1.0
         return self.node_weight(own) * share
+
+    @cached_property
+    def outside(self) -> float:
+        """Probability of a gap with a cause that no effect of the catalogue describes.
+
+        That is a discrepancy beside the soil alone; and beside effects, a law far from the
+        catalogue's, an amplitude that is likelier of an unknown cause than of a usual error, or a
+        signature that an effect imitates.
+        """
+        found = 0.0
+        for node, weight in zip(self.nodes, self._weights[1], strict=False):
+            present = 1.0 - node.share_without
+            if not node.hypothesis.effects:
+                found += weight * present
+                continue
+            share = constants.OTHER_LAW_RIGHT if self.by_other_law(node.hypothesis) else 1.0
+            amplitude = np.exp(node.beside.at.log[: self.terms.channels])
+            usual = 1.0 - present * unknown_cause(amplitude)
+            found += weight * (1.0 - constants.IN_CATALOGUE * share * usual)
+        return float(found)
 
     def within(self, effects: Collection[str]) -> float:
         """Probability that these effects are present, within the catalogue."""

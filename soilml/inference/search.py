@@ -115,7 +115,7 @@ class Search:
         self.terms = gaussian_terms(
             readings, problem.case, scatter_columns(best.fitted(), readings)
         )
-        kept = [f for f in carried if f.objective < best.objective + constants.OTHER_OPTIMUM]
+        kept = [f for f in carried if f.objective < best.objective + constants.NEAR_AT_FIRST]
         first = self.terms.first()
         jobs = [
             StartedFit(SOIL_ALONE, f.start_values(), first, none, f.linearisation) for f in kept
@@ -125,7 +125,7 @@ class Search:
             raise InputError("the model cannot be fitted to these rows")
         self._choose_autocorrelation(self.nodes[SOIL_ALONE])
         soil = self.nodes[SOIL_ALONE]
-        large = self.terms.amplitude(soil.beside.at).max(initial=0.0) > constants.HIDING
+        large = self.terms.amplitude(soil.beside.at).max(initial=0.0) > constants.LARGE_DISCREPANCY
         if large and soil.beside.trusted < soil.without.trusted:
             self._fit_hidden(soil, best)
 
@@ -163,13 +163,13 @@ class Search:
             key=lambda item: item[:2],
         )
         jobs: list[StartedFit] = []
-        for _, h, own in singles[: 2 * constants.HIDDEN]:
+        for _, h, own in singles[: 2 * constants.FITS]:
             start = {path: 0.5 + INWARD * (x - 0.5) for path, x in own.start.items()}
             if not any(job.hypothesis.effects == h.effects for job in jobs) or len(jobs) < 3:
                 jobs.append(StartedFit(h, start, own.at, soil.outliers))
-            if len(jobs) == constants.HIDDEN:
+            if len(jobs) == constants.FITS:
                 break
-        self._settle(jobs, float("inf"), constants.NEAR_HIDDEN)
+        self._settle(jobs, float("inf"), constants.NEAR_AT_FIRST)
 
     def beside(self, fixed: Floats, inner: Sequence[Floats], least: float) -> Search:
         """The hypotheses above a probability, fitted beside further Gaussian terms.
@@ -246,7 +246,7 @@ class Search:
             linear.evidence(linear.best(replace(start, present=present)))
             for start, present in zip(starts, (True, False), strict=True)
         )
-        prior = constants.DISCREPANCY_PRIOR
+        prior = constants.EVEN_PRIOR
         node = Explanation(hypothesis, fit, linear, beside, without, 0.0, outliers)
         log = np.logaddexp(
             np.log(prior) - 0.5 * beside.trusted, np.log(1.0 - prior) - 0.5 * without.trusted
@@ -262,7 +262,7 @@ class Search:
         lowest: The value of the best node so far.
         """
         found: dict[Hypothesis, Explanation] = {}
-        for turn in range(constants.FITS_IN_TURN):
+        for turn in range(constants.IN_TURN):
             again = []
             fits = self.fit(jobs, COARSE if turn == 0 else FINE)
             for job, fit in zip(jobs, fits, strict=True):
@@ -281,7 +281,7 @@ class Search:
                     found[job.hypothesis] = node
                 lowest = min(lowest, node.value)
                 target = node.promising.at
-                moved = _distance(self.terms, job.at, target) > constants.MOVED
+                moved = _distance(self.terms, job.at, target) > constants.WORTH_A_FIT
                 moved = moved or bool((node.outliers != job.outliers).any())
                 promised = node.promising.promised > constants.WORTH_A_FIT
                 if node.hoped < lowest + margin and (moved or promised):
@@ -310,7 +310,7 @@ class Search:
             far = -0.5 * (error**2 / wide + np.log(wide)) + odds
             gain = np.where(strays, usual - far, far - usual)
             i = int(np.argmax(gain))
-            if gain[i] < constants.OUTLIER_GAIN:
+            if gain[i] < constants.WORTH_A_FIT:
                 break
             strays[i] = not strays[i]
         return strays
@@ -321,7 +321,7 @@ class Search:
         """The fits of the next round; in the first one the best single effects in any case."""
         lowest = self.lowest
         near = sorted(self.nodes.values(), key=lambda node: node.value)
-        near = [node for node in near if node.value < lowest + constants.NEAR][: constants.EXTENDED]
+        near = [node for node in near if node.value < lowest + constants.NEAR][: constants.IN_TURN]
         for node in {id(n): n for n in (*near, self.nodes[SOIL_ALONE])}.values():
             if node.extended:
                 continue
@@ -340,10 +340,10 @@ class Search:
             (value, h)
             for value, h in open_
             if value < lowest + (constants.NEAR if len(h.effects) <= 1 else constants.NEAR_SET)
-        ][: constants.FITS_PER_ROUND]
+        ][: constants.FITS]
         if first:
             singles = [own for own in open_ if len(own[1].effects) == 1]
-            within = sorted({*within, *singles[: constants.FIRST_SINGLES]})
+            within = sorted({*within, *singles[: constants.FITS // 2]})
         chosen = [(h, self.predicted[h]) for _, h in within]
         return [StartedFit(h, own.start, own.at, own.outliers) for h, own in chosen]
 

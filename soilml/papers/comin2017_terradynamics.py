@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from soilml.arrays import Array, Floats
-from soilml.systems.wheel_legs.gaits import gait_metrics, walk_tables
+from soilml.systems.wheel_legs.gaits import gait_metrics
 from soilml.systems.wheel_legs.resistive_force import (
     FEET,
     GROUNDS,
@@ -37,22 +37,47 @@ STATES = (0.5, 1.0, 2.0)
 
 
 @cache
+def _walked() -> dict[tuple[str, str], dict[str, Array]]:
+    """Metrics of all walks, by choice and group, which one batch takes no longer for than each.
+
+    Groups: 1 to 6 `legs` without feet, fig. 5; `feet` on each of the stiffnesses, fig. 6; `soils`
+    of the four names in three states, on which eq. 29 is fitted, without their stress at no depth.
+    """
+    cases: dict[tuple[str, str], list[tuple[WheelLeg, LinearGround]]] = {}
+    for choice, changes in OPEN_CHOICES.items():
+        middle = LinearGround(stiffness=MIDDLE)
+        counts = range(1, MAX_LEGS + 1)
+        cases[choice, "legs"] = [(wheel_leg("none", legs=n, **changes), middle) for n in counts]
+        cases[choice, "feet"] = [
+            (wheel_leg(foot, **changes), LinearGround(stiffness=alpha))
+            for foot in FEET
+            for alpha in STIFFNESSES
+        ]
+    cases["as assumed", "soils"] = [(wheel_leg(), replace(g, offset=0.0)) for g in _soils()]
+    legs, grounds = zip(*(case for group in cases.values() for case in group), strict=True)
+    found, first, metrics = {}, 0, gait_metrics(walk(legs, grounds))
+    for group, own in cases.items():
+        found[group] = {name: v[first : first + len(own)] for name, v in metrics.items()}
+        first += len(own)
+    return found
+
+
+def _soils() -> list[LinearGround]:
+    return [
+        replace(ground, stiffness=share * ground.stiffness, offset=share * ground.offset)
+        for ground in GROUNDS.values()
+        for share in STATES
+    ]
+
+
 def _legs(name: str, choice: str = "as assumed") -> Array:
-    """A metric of 1 to 6 legs without feet, fig. 5, (6,)."""
-    counts, under = range(1, MAX_LEGS + 1), {"": LinearGround(stiffness=MIDDLE)}
-    return np.asarray(_walks(("none",), tuple(counts), under, choice)[name])
+    """A metric of 1 to 6 legs, (6,)."""
+    return _walked()[choice, "legs"][name]
 
 
-@cache
 def _feet(name: str, choice: str = "as assumed") -> Array:
-    """A metric of the four feet over the stiffnesses, fig. 6, (feet, stiffnesses)."""
-    under = {f"{alpha:g}": LinearGround(stiffness=alpha) for alpha in STIFFNESSES}
-    found = _walks(tuple(FEET), (5,), under, choice)[name]
-    return np.asarray(found).reshape(len(FEET), len(STIFFNESSES))
-
-
-def _walks(feet: Any, legs: Any, under: dict[str, LinearGround], choice: str) -> Any:
-    return walk_tables(feet, legs, under, (float("nan"),), **OPEN_CHOICES[choice]).columns
+    """A metric of the four feet over the stiffnesses, (feet, stiffnesses)."""
+    return _walked()[choice, "feet"][name].reshape(len(FEET), len(STIFFNESSES))
 
 
 def _lower(values: Array) -> int:
@@ -67,13 +92,7 @@ def _sinkage_fit() -> dict[str, float]:
 
     The normal stress on the plates is proportional to the depth (eq. 4), without sigma_0.
     """
-    grounds = [
-        replace(ground, stiffness=share * ground.stiffness, offset=share * ground.offset)
-        for ground in GROUNDS.values()
-        for share in STATES
-    ]
-    walked = gait_metrics(walk(wheel_leg(), [replace(ground, offset=0.0) for ground in grounds]))
-    sunk = walked["sinkage_midstance_m"]
+    grounds, sunk = _soils(), _walked()["as assumed", "soils"]["sinkage_midstance_m"]
     read = np.isfinite(sunk)
     z = sunk[read]
     sigma = np.asarray([ground.normal_stiffness for ground in grounds])[read]

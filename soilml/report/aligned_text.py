@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Sequence
 
 WIDTH = 80  # Characters of a line
-_LEAST_WRAPPED = 16  # Fewest characters to which a column is wrapped
+_LEAST_WRAPPED = 14  # Fewest characters to which a column is wrapped
 
 
 def wrapped(text: str) -> str:

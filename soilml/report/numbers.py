@@ -223,7 +223,11 @@ def parameter_name(path: str) -> str:
 
 
 def capitalised(text: str) -> str:
-    """The text as the beginning of a sentence; symbols, files and commands stay."""
-    first = text.split(" ", 1)[0].rstrip(":,;.")
+    """The text as the beginning of a sentence; symbols, files, commands and `name:` stay.
+
+    >>> capitalised("two runs"), capitalised("rate: needs speed_m_s"), capitalised("n = 1.1")
+    ('Two runs', 'rate: needs speed_m_s', 'n = 1.1')
+    """
+    first = text.split(" ", 1)[0].rstrip(",;.")
     word = len(first) > 1 and first.isalpha() and first not in ("soilml", "ln")
     return text[0].upper() + text[1:] if word or first == "a" else text

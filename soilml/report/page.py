@@ -73,9 +73,8 @@ class Provenance:
 
 def page_content(report: Report) -> dict[str, Any]:
     """What a page shows of a report: texts, cells of tables, and pictures as elements `svg`."""
-    own = [report.figures] if report.figures is not None else []
     tables = []
-    for table in (*own, *report.tables):
+    for table in report.all_tables:
         heads, rows, words = table.cells()
         tables.append(
             {
@@ -103,7 +102,7 @@ def page_content(report: Report) -> dict[str, Any]:
             }
             for i, picture in enumerate(report.pictures)
         ],
-        "with_figures": bool(own),
+        "with_figures": report.figures is not None,
         "tables": tables,
         "remarks": [_said(remark.text) for remark in report.remarks],
         "details": [

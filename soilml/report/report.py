@@ -12,10 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from soilml.remarks import Remark
-from soilml.report.numbers import (
-    capitalised,
-    pretty,
-)
+from soilml.report.numbers import capitalised, pretty
 from soilml.report.tables import ReportTable
 
 MOST_LINES = 5  # Lines below a verdict, at most
@@ -94,17 +91,20 @@ class Report:
     basis: str = ""
     notation: Sequence[tuple[str, str]] = field(default_factory=tuple)
 
+    @property
+    def all_tables(self) -> list[ReportTable]:
+        """Key figures, where there are any, and the further tables."""
+        return [*([] if self.figures is None else [self.figures]), *self.tables]
+
     def summary(self) -> str:
         """The verdict, then at most five lines: sentences, and key figures where there is room."""
-        lines = list(self.lines)
-        if self.figures is not None:
-            lines += self.figures.sentences()
-        return "\n".join([self.verdict, *lines[:MOST_LINES]])
+        verdict, *lines = self.answer
+        return "\n".join([verdict, *lines[:MOST_LINES]])
 
     def text(self, details: bool = False) -> str:
         """The report for a terminal: verdict, lines, first table, warnings; all with details."""
         parts = ["\n".join([self.verdict, *self.lines])]
-        tables = [*([self.figures] if self.figures is not None else []), *self.tables]
+        tables = self.all_tables
         for i, table in enumerate(tables if details else tables[:1]):
             head = f"{capitalised(table.title)}\n" if details or i else ""
             parts.append(head + table.text(most=None if details else TERMINAL_ROWS))
@@ -129,7 +129,7 @@ class Report:
     def markdown(self) -> str:
         """Verdict, lines and tables as Markdown."""
         parts = [f"**{self.verdict}**", *map(pretty, self.lines)]
-        for table in [*([self.figures] if self.figures is not None else []), *self.tables]:
+        for table in self.all_tables:
             heads, rows, _ = table.cells()
             lines = [heads, ["---"] * len(heads), *rows]
             parts.append("\n".join(f"| {' | '.join(map(_piped, cells))} |" for cells in lines))
@@ -148,7 +148,7 @@ class Report:
 
         lines = "".join(f"<p>{escape(pretty(line))}</p>" for line in self.lines)
         table = ""
-        for own in [*([self.figures] if self.figures is not None else []), *self.tables][:1]:
+        for own in self.all_tables[:1]:
             heads, rows, _ = own.cells()
             head = "".join(f"<th>{escape(pretty(cell))}</th>" for cell in heads)
             body = "".join(
@@ -169,7 +169,7 @@ def by_group(
     first = next(iter(reports.values()))
     every: dict[str, dict[str, ReportTable]] = {}
     for name, one in reports.items():
-        for table in [*([one.figures] if one.figures is not None else []), *one.tables]:
+        for table in one.all_tables:
             every.setdefault(table.title, {})[name] = table
     remarks = [r.under(f"{by} {name}: ") for name, one in reports.items() for r in one.remarks]
     remarks += [

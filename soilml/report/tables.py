@@ -101,9 +101,9 @@ class Column:
         one = isinstance(self.unit, str)
         largest = max((abs(v) for v in values if np.isfinite(v)), default=0.0)
         factors = [
-            shown_unit(self.unit, largest) if one else shown_unit(unit, abs(v))  # type: ignore[arg-type]
+            shown_unit(unit, largest if one else abs(v))
             for unit, v in zip(
-                [self.unit] * count if one else self.unit,
+                _of_rows(self),
                 self.sizes if self.sizes is not None else values,
                 strict=True,
             )
@@ -131,6 +131,12 @@ def _is_truth(value: Any) -> bool:
 
 def _chained(parts: Iterable[Sequence[Any]]) -> list[Any]:
     return [value for part in parts for value in part]
+
+
+def _of_rows(column: Column) -> list[str]:
+    """The unit of each row."""
+    unit = column.unit
+    return [unit] * len(column.values) if isinstance(unit, str) else list(unit)
 
 
 @dataclass(frozen=True)
@@ -187,28 +193,17 @@ class ReportTable:
         columns = [Column(by, names)]
         for k, own in enumerate(first.columns):
             every = [table.columns[k] for table in parts]
-            units = [
-                [c.unit] * len(c.values) if isinstance(c.unit, str) else list(c.unit) for c in every
-            ]
-            columns.append(
-                replace(
-                    own,
-                    values=_chained(c.values for c in every),
-                    unit=own.unit if isinstance(own.unit, str) else _chained(units),
-                    std=None
-                    if own.std is None
-                    else _chained(list(c.std) for c in every if c.std is not None),
-                    ends=None
-                    if own.ends is None
-                    else (
-                        _chained(c.ends[0] for c in every if c.ends),
-                        _chained(c.ends[1] for c in every if c.ends),
-                    ),
-                    sizes=None
-                    if own.sizes is None
-                    else _chained(list(c.sizes) for c in every if c.sizes is not None),
-                )
-            )
+            units = [_of_rows(c) for c in every]
+            ends = [[v for c in every if c.ends for v in c.ends[end]] for end in (0, 1)]
+            joined: dict[str, Any] = {
+                name: _chained(getattr(c, name) for c in every)
+                for name in ("values", "std", "sizes")
+                if getattr(own, name) is not None
+            }
+            unit = own.unit if isinstance(own.unit, str) else _chained(units)
+            if own.ends:
+                joined["ends"] = ends[0], ends[1]
+            columns.append(replace(own, unit=unit, **joined))
         return replace(first, columns=columns)
 
     def cells(self) -> tuple[list[str], list[list[str]], list[bool]]:
@@ -254,8 +249,7 @@ class ReportTable:
     def sentences(self) -> list[str]:
         """A line for each row: its first cell, and the numbers of the second column."""
         first, value = self.columns[:2]
-        count = len(first.values)
-        units = [value.unit] * count if isinstance(value.unit, str) else list(value.unit)
+        count, units = len(first.values), _of_rows(value)
         low, high = value.ends or ([np.nan] * count,) * 2
         std = value.std if value.std is not None else [0.0] * count
         return [

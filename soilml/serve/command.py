@@ -27,6 +27,8 @@ HOST = "127.0.0.1"  # The page is for this machine alone
 #: What needs a library, and the extra that brings it.
 _LIBRARIES = ((("tornado", "serve"), ("scipy", "ground"), ("jinja2", "ground"),
                ("matplotlib", "ground"), ("pint", "ground")))  # fmt: skip
+#: Seconds after which a connection is closed: one without requests, and one whose body stalls.
+_SECONDS = {"idle_connection_timeout": 3600.0, "body_timeout": 120.0}
 PORT = 8642  # Where the page is served unless --port says otherwise
 ARGUMENTS = (
     (f"--port N ({PORT})", "port of the page; 0 takes a free one", whole_number_from(0, 65535)),
@@ -97,7 +99,7 @@ async def _serve(opened: socket.socket, folder: Path, *, browser: bool) -> int:
                 break
     port = opened.getsockname()[1]
     app, jobs = application(folder, port)
-    server = HTTPServer(app, max_body_size=LARGEST_BODY, idle_connection_timeout=3600.0)
+    server = HTTPServer(app, max_body_size=LARGEST_BODY, **_SECONDS)
     server.add_socket(opened)
     address = f"http://{HOST}:{port}/"
     print(f"soilml serves {address} on this machine alone; Ctrl-C ends it", flush=True)

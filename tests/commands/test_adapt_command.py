@@ -93,9 +93,13 @@ def test_without_a_gap_the_old_file_stays_and_that_is_a_result(tmp_path, capsys)
 
 @pytest.mark.slow
 def test_the_chain_from_a_hidden_effect_to_a_better_file(tmp_path, capsys, small_training):
+    """A wheel that digs itself in, heavy loads, and priors that reach to soft soils."""
     out = tmp_path / "out"
-    words = [*write_log(tmp_path, SlipSinkage(n1=0.5)), "--out", str(out)]
-    words += ["--rows", "3000", "--soil", str(tmp_path / "model.toml"), "--against", "wheel"]
+    soft = 'kphi = { range = [2e5, 3e6], scale = "log" }\nn = [0.7, 1.3]\n'
+    loads = (60.0, 120.0, 200.0, 90.0, 150.0, 75.0)
+    words = [*write_log(tmp_path, SlipSinkage(n1=0.5), loads=loads, priors=soft)]
+    words += ["--out", str(out), "--rows", "2000", "--against", "wheel"]
+    words += ["--soil", str(tmp_path / "model.toml")]
     assert main(words) == 0
     shown = capsys.readouterr().out
     content = json.loads((out / "adapt.json").read_text())
@@ -111,21 +115,12 @@ def test_the_chain_from_a_hidden_effect_to_a_better_file(tmp_path, capsys, small
     assert not (out / "before.onnx").exists()
     assert "slip-sinkage" in (out / "adapted.toml").read_text()
     file = soilml.Estimator.load(out / "adapted.onnx")
-    scales = ErrorScales.of_list(json.loads(file.metadata["set"])["model_error_scales"])
+    sets = json.loads(file.metadata["set"])
+    scales = ErrorScales.of_list(sets["model_error_scales"])
     assert scales.sizes[0].tolist() == list(CHECKED[1:]) and scales.probabilities[0] > 0.5
     assert "model-errors" in [remark["code"] for remark in content["remarks"]]
     assert f"| {CHECKED.bearing} |" in (out / "adapted.md").read_text()
     assert file.names == ("cohesion", "friction_angle", "shear_modulus")
-
-
-def test_soils_that_carry_a_part_of_the_loads_are_learned_from(tmp_path, capsys, small_training):
-    """A wheel that digs itself in, heavy loads, and priors that reach to soft soils."""
-    out = tmp_path / "out"
-    soft = 'kphi = { range = [2e5, 3e6], scale = "log" }\nn = [0.7, 1.3]\n'
-    words = write_log(tmp_path, SlipSinkage(n1=0.5), loads=(60.0, 120.0, 200.0), priors=soft)
-    assert main([*words, "--out", str(out), "--rows", "3000"]) == 0
-    assert "with slip-sinkage" in capsys.readouterr().out
-    sets = json.loads(soilml.Estimator.load(out / "adapted.onnx").metadata["set"])
     assert 0.9 < sets["carried"] < 1.0 and sets["load"] == [50.0, 240.0]
     share = f"carry the wheel in {sets['carried']:.2%} of the operating conditions"
     assert share in (out / "adapted.md").read_text()

@@ -45,7 +45,9 @@ def test_both_tables_in_either_order_give_a_model_file_that_identify_takes(table
     assert written["estimates"]["kc"]["unit"] == "N/m^(n+1)"
     assert [t["test"] for t in written["plate_tests"]] == ["small", "large"]
     assert (tables / "soil.png").read_bytes()[:4] == b"\x89PNG"
-    assert main(["simulate", "soil.toml", "--slip", "0.1,0.3", "--load", "60"]) == 0
+    assert (
+        main(["simulate", "soil.toml", "--slip", "0.1,0.3", "--load", "60", "--format", "csv"]) == 0
+    )
     runs = capsys.readouterr().out.replace("slip,", "run,slip,", 1).replace("\n0.", "\na,0.")
     (tables / "runs.csv").write_text(runs)
     assert main(["identify", "soil.toml", "runs.csv", "--method", "nonlinear"]) == 0

@@ -18,7 +18,21 @@ def rows_of(text):
 @pytest.fixture
 def runs_file(tmp_path, model_file, capsys):
     """Fifteen simulated rows in two runs."""
-    assert main(["simulate", str(model_file), "--slip", "0.1:0.5:5", "--load", "40,70,100"]) == 0
+    assert (
+        main(
+            [
+                "simulate",
+                str(model_file),
+                "--slip",
+                "0.1:0.5:5",
+                "--load",
+                "40,70,100",
+                "--format",
+                "csv",
+            ]
+        )
+        == 0
+    )
     rows = rows_of(capsys.readouterr().out)
     path = tmp_path / "runs.csv"
     lines = ["run,slip,load_N,torque_Nm"]
@@ -39,12 +53,15 @@ def test_simulate_writes_the_promised_columns(model_file, tmp_path, capsys):
     assert [float(r["slip"]) for r in rows] == pytest.approx(np.linspace(0, 0.6, 13))
     assert {r["status"] for r in rows} == {"ok"}
     capsys.readouterr()
-    assert main(command) == 0
+    assert main([*command, "--format", "csv"]) == 0
     assert capsys.readouterr().out == out.read_text()
 
 
 def test_simulate_leaves_blanks_and_a_reason_where_there_is_no_equilibrium(model_file, capsys):
-    assert main(["simulate", str(model_file), "--slip", "0.2", "--load", "60,1e6"]) == 0
+    assert (
+        main(["simulate", str(model_file), "--slip", "0.2", "--load", "60,1e6", "--format", "csv"])
+        == 0
+    )
     good, bad = rows_of(capsys.readouterr().out)
     assert good["status"] == "ok"
     assert bad["torque_Nm"] == bad["sinkage_m"] == bad["drawbar_pull_N"] == ""
@@ -87,7 +104,7 @@ def test_generate_train_estimate_follow_each_other(tmp_path, runs_file, capsys):
     assert main(command) == 0
     assert main(["train", str(tmp_path / "spec.toml"), data, model]) == 0
     capsys.readouterr()
-    assert main(["estimate", model, str(runs_file)]) == 0
+    assert main(["estimate", model, str(runs_file), "--format", "csv"]) == 0
     captured = capsys.readouterr()
     rows = rows_of(captured.out)
     assert len(rows) == 15

@@ -31,7 +31,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def spoken(capsys, *command):
-    assert main(list(command)) == 0
+    assert main([*command, "--format", "csv"]) == 0
     return capsys.readouterr()
 
 

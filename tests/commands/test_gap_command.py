@@ -123,11 +123,11 @@ def test_gap_json_has_the_promised_keys(done):
     found = content(done)
     assert {
         "status", "effects", "cause_set", "where", "gap", "soil_before", "soil_after",
-        "mimic_radius", "next_runs", "seed", "soilml_version",
+        "outside_probability", "next_runs", "seed", "soilml_version",
     } <= set(found)  # fmt: skip
     assert found["status"] == "named" and ["slip-sinkage"] in found["cause_set"]
     (effect,) = found["effects"]
-    assert {"name", "parameters", "alternatives", "separating_snr"} <= set(effect)
+    assert {"name", "parameters", "alternatives", "probability"} <= set(effect)
     assert set(effect["parameters"]["n1"]) == {"value", "std", "unit"}
     assert {"channel", "slip", "load_N", "z", "p"} <= set(found["where"][0])
     assert len(found["where"][0]["slip"]) == len(found["where"][0]["load_N"]) == 2
@@ -207,7 +207,7 @@ def test_an_effect_of_ones_own_is_hidden_found_and_written(inputs, tmp_path, cap
     true = tmp_path / "true.toml"
     true.write_text(MODEL + '[[effect]]\nname = "cable-drag"\ndrag = 40.0\n')
     command = ["simulate", str(true), "--slip", "0.08:0.6:8", "--load", "40,60,90,140"]
-    assert main([*command, "--effects", str(own)]) == 0
+    assert main([*command, "--effects", str(own), "--format", "csv"]) == 0
     runs = tmp_path / "runs.csv"
     runs.write_text(noisy(csv.DictReader(io.StringIO(capsys.readouterr().out))))
     files = (str(inputs / "model.toml"), str(runs), "--effects", str(own))

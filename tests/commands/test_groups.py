@@ -55,7 +55,7 @@ def test_all_runs_of_one_soil_are_one_set_of_readings(folder, capsys):
     (folder / "one.csv").write_text("\n".join(renamed) + "\n")
     found = {}
     for table, by in (("runs.csv", "all"), ("one.csv", "run")):
-        assert main(["estimate", "wheel", table, "--by", by]) == 0
+        assert main(["estimate", "wheel", table, "--by", by, "--format", "csv"]) == 0
         (found[by],) = rows_of(capsys.readouterr().out)
         assert found[by].pop(by) == {"all": "all", "run": "x"}[by]
     assert found["all"] == found["run"] and found["all"]["rows"] == "4"

@@ -31,6 +31,12 @@ def test_a_bare_word_prints_at_most_twenty_commands_in_eighty_columns(capsys, mo
     assert set(COMMANDS) == set(PARSERS) and set(COMMANDS) <= named
 
 
+@pytest.mark.parametrize("name", PARSERS)
+def test_help_fits_eighty_columns(name, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert max(map(len, PARSERS[name].format_help().splitlines())) <= 80
+
+
 def test_an_option_has_one_meaning_and_one_unit_everywhere():
     """The name of its value says both; a list of values has the name of one."""
     kinds = defaultdict(set)

@@ -41,7 +41,7 @@ def write_runs(path: Path, run: dict[str, np.ndarray], **columns: float) -> None
 
 def widths(capsys, *arguments: str) -> np.ndarray:
     """Standard deviations of the single line of `estimate --by run`."""
-    assert main(["estimate", *arguments, "--by", "run"]) == 0
+    assert main(["estimate", *arguments, "--by", "run", "--format", "csv"]) == 0
     head, row = (line.split(",") for line in capsys.readouterr().out.splitlines()[:2])
     return np.asarray([float(v) for k, v in zip(head, row, strict=True) if k.endswith("_std")])
 

@@ -49,7 +49,7 @@ COMMAND = ["paper", "sensor-wheel", "m.toml", "runs.csv", "--stress", "stress.cs
 
 
 def test_the_modulus_is_found_and_predicts_the_pull_of_the_slopes(files, capsys):
-    assert main(COMMAND) == 0
+    assert main([*COMMAND, "--format", "csv"]) == 0
     said = capsys.readouterr()
     rows = list(csv.DictReader(io.StringIO(said.out)))
     assert [row["run"] for row in rows] == list(SLOPES)
@@ -68,7 +68,7 @@ def test_a_stress_in_kpa_is_told(files, capsys):
     lines = [",".join(head), *(f"{run},{angle},{float(p) / 1000}" for run, angle, p in rows)]
     (files / "stress.csv").write_text("\n".join(lines) + "\n")
     assert main(COMMAND) == 0
-    assert "2e+03 times the measured one: probably normal_Pa is in kPa" in capsys.readouterr().err
+    assert "2e+03 times the measured one: probably normal_Pa is in kPa" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,6 @@ def test_identify_loads_neither_distributions_nor_the_runtime_for_trained_models
         "sklearn",
         "pyarrow",
         "matplotlib",
-        "rich",
     }
 
 

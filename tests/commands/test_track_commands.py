@@ -44,7 +44,7 @@ def numbers(column):
 
 
 def test_the_shares_carry_the_load(folder, capsys):
-    assert main([*SIMULATE, "--efficiency", "--picture", "t.png"]) == 0
+    assert main([*SIMULATE, "--efficiency", "--picture", "t.png", "--format", "csv"]) == 0
     level = columns_of(capsys.readouterr().out)
     parts = [numbers(level[f"{part}_share"]) for part in ("front", "belt", "rear")]
     np.testing.assert_allclose(sum(parts), 1.0, atol=1e-9)

@@ -18,7 +18,7 @@ def rows_of(text):
 def test_a_row_for_each_combination_and_firm_ground_carries_better(tmp_path, capsys):
     picture = tmp_path / "feet.png"
     command = ["paper", "walk", "--foot", "LTF,CIF", "--stiffness", f"{SOFT},0.7e6,{FIRM}"]
-    assert main([*command, "--picture", str(picture)]) == 0
+    assert main([*command, "--picture", str(picture), "--format", "csv"]) == 0
     found = rows_of(capsys.readouterr().out)
     assert [(row["foot"], float(row["stiffness_N_m3"])) for row in found] == [
         (foot, stiffness) for foot in ("LTF", "CIF") for stiffness in (4e5, 7e5, 1e6)

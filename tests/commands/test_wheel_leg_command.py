@@ -28,10 +28,8 @@ def strides(tmp_path):
 
 
 def test_each_sensor_and_the_fused_soil(strides, capsys):
-    assert (
-        main(["paper", "wheel-leg", str(strides), "--by", "run", "--torque-model", "empirical"])
-        == 0
-    )
+    command = ["paper", "wheel-leg", str(strides), "--by", "run", "--torque-model", "empirical"]
+    assert main([*command, "--format", "csv"]) == 0
     found = {(row["run"], row["sensor"]): row for row in rows_of(capsys.readouterr().out)}
     assert set(found) == {("a", "torque"), ("a", "sinkage"), ("a", "fused"), ("b", "sinkage")}
     torque, sinkage, fused = (found["a", name] for name in ("torque", "sinkage", "fused"))
@@ -56,15 +54,8 @@ def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
     lines = [f"a,{s},{(s - a) / b},{(s - c) / d},\n" for s in (0.1, 0.3)]
     file, picture = tmp_path / "strides.csv", tmp_path / "slip.png"
     file.write_text(HEAD + "".join(lines) + f"b,,,{(0.4 - c) / d},\n")
-    command = [
-        "paper",
-        "wheel-leg",
-        str(file),
-        "--torque-model",
-        "empirical",
-        "--vibration-model",
-        "planar",
-    ]
+    command = ["paper", "wheel-leg", str(file), "--torque-model", "empirical"]
+    command += ["--vibration-model", "planar", "--format", "csv"]
     assert main([*command, "--known", "ssc-2", "--picture", str(picture)]) == 0
     found = rows_of(capsys.readouterr().out)
     for row, slip in zip(found, (0.1, 0.3, 0.4), strict=True):

@@ -97,7 +97,7 @@ def test_the_effect_of_the_page_is_neutral_by_default_and_acts(clone, capsys):
         effect = f'[[effect]]\nname = "cable-torque"\nshare = {share}\n'
         Path("model.toml").write_text(model + effect)
         command = ["simulate", "model.toml", "--slip", "0.3", "--load", "60"]
-        assert main([*command, "--effects", "mine.py"]) == 0
+        assert main([*command, "--effects", "mine.py", "--format", "csv"]) == 0
         row, reading = capsys.readouterr().out.splitlines()[:2]
         torque[share] = float(reading.split(",")[row.split(",").index("torque_Nm")])
     assert main(command) == 2

@@ -111,7 +111,7 @@ def test_the_command_fuses_files_and_goes_on_without_a_channel(trained, tmp_path
     assert "differs from row to row of a run" in capsys.readouterr().err
     # a file that reads the same sensors: by the correlation, but not as if it were independent
     both = str(trained(BOTH + OF_TORQUE + OF_PULL)[1])
-    assert main(["estimate", first, str(log), "--with", both]) == 0
+    assert main(["estimate", first, str(log), "--with", both, "--format", "csv"]) == 0
     assert "fused by the rule correlated" in capsys.readouterr().err
     log.write_text("run,load_N,torque_Nm\na,60,3.2\n")
     assert main(command) == 2

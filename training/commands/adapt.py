@@ -17,22 +17,22 @@ kept back, beside one trained on the model as it was.
   soilml adapt MODEL.toml RUNS.csv --out FOLDER
   soilml adapt MODEL.toml RUNS.csv --out FOLDER --against exported/wheel.onnx
 
-A quarter of the runs is kept back (--seed). From the torque of their first rows
-each file estimates the soil, and its model predicts torque, drawbar pull and
-sinkage of the later rows. The verdict comes first: by how much the error falls,
-or why the old file stays. Of fewer than four runs none is kept back: the file
-is then trained and not judged.
+A quarter of the runs is kept back (--seed). From the torque of their first
+rows each file estimates the soil, and its model predicts torque, drawbar pull
+and sinkage of the later rows. The verdict comes first: by how much the error
+falls, or why the old file stays. Of fewer than four runs none is kept back:
+the file is then trained and not judged.
 
-FOLDER receives report.html (start here), adapt.json, adapted.onnx with its card
-adapted.md, adapted.c and adapted.h, adapted.toml (the model with the effect),
-the recipes and rows of both files, before.onnx, campaign.csv and kept_back.csv,
-and the files of `soilml gap` in FOLDER/gap.
+FOLDER receives report.html (start here), adapt.json, adapted.onnx with its
+card adapted.md, adapted.c and adapted.h, adapted.toml (the model with the
+effect), the recipes and rows of both files, before.onnx, campaign.csv and
+kept_back.csv, and the files of `soilml gap` in FOLDER/gap.
 
 The exit status is 0 also where the analysis supports no change, which is a
 result, and 2 for bad input. --suspected adds the first suspect where the
 evidence names no effect and `gap` predicts rows kept back better with it.
---truth TRUE.toml, with [soil], compares the estimates with a soil that is known;
-columns such as cohesion_Pa do the same for each run.
+--truth TRUE.toml, with [soil], compares the estimates with a soil that is
+known; columns such as cohesion_Pa do the same for each run.
 """
 #: Files of the folder, beside those of the folder `gap` in it.
 FILES = (

@@ -17,7 +17,8 @@ its header OUT.h. They use the structs that export c writes for each file.
 
   soilml export c exported/slip_torque.onnx slip_torque.c
   soilml export c exported/slip_vibration.onnx slip_vibration.c
-  soilml export fusion exported/slip_torque.onnx exported/slip_vibration.onnx slip.c
+  soilml export fusion exported/slip_torque.onnx \\
+      exported/slip_vibration.onnx slip.c
 
 slip_fuse() weighs the estimates by their variances and by the correlation of
 their errors, which are in the files. docs/how-to/deploy.md describes it.

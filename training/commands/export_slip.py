@@ -10,16 +10,17 @@ from soilml.cli.options import InputFile, OutputFile
 from soilml.io.atomic_files import output_files
 
 DESCRIPTION = """\
-Write one step of the filter of `soilml drive slip` for a rover: belief and readings
-in, belief, speed, slips and flags out. All shapes are numbers, so that memory
-and time of a step are fixed.
+Write one step of the filter of `soilml drive slip` for a rover: belief and
+readings in, belief, speed, slips and flags out. All shapes are numbers, so
+that memory and time of a step are fixed.
 
   soilml export slip ROVER.toml rover_slip.onnx
   soilml export slip ROVER.toml rover_slip.onnx --c rover_slip.c --draws 512
 
-ROVER.toml is that of `soilml drive slip`. The table of its forces is part of the
-file: fewer --draws are smaller and coarser. soilml.onboard.slip_stream runs
-OUT.onnx with numpy and onnxruntime alone; OUT.c needs the C library alone.
+ROVER.toml is that of `soilml drive slip`. The table of its forces is part of
+the file: fewer --draws are smaller and coarser. soilml.onboard.slip_stream
+runs OUT.onnx with numpy and onnxruntime alone; OUT.c needs the C library
+alone.
 """
 SOILS = 1024
 STEEPEST = 25.0  # Degrees; pitch to either side for which loads are tabulated

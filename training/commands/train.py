@@ -37,7 +37,7 @@ command writes the model card OUT.md. A spec contains
   hidden = 64                        # response to slip, load and soil
   epochs = 500
   small = true                       # for a microcontroller: fewer monomials,
-  terms = 14                         # 10 to 25, and fewer points (docs/how-to/deploy.md)
+  terms = 14                         # 10 to 25; docs/how-to/deploy.md
 """
 ARGUMENTS = (
     ("spec SPEC.toml", "spec file, or the name of a packaged spec", InputFile),

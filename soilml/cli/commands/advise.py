@@ -24,10 +24,11 @@ MODEL.toml.
   soilml plan next MODEL.toml RUNS.csv --slip 0.1,0.3,0.5 --load 30:120:4
   soilml plan next MODEL.toml --load 30:120:4 --picture map.png
 
-<parameter>_left is the standard deviation that is expected after a row, divided
-by that of the prior (1: nothing learned), over soils drawn as by soilml
-identify. Rows are the best candidate for all parameters together and for each,
-the best repetition of a measured row, and the best sequence of --count rows.
+<parameter>_left is the standard deviation that is expected after a row,
+divided by that of the prior (1: nothing learned), over soils drawn as by
+soilml identify. Rows are the best candidate for all parameters together and
+for each, the best repetition of a measured row, and the best sequence of
+--count rows.
 
 Candidate channels are those whose noise is declared in [noise]: torque alone,
 and torque with each other channel. Without --load, loads from half to twice

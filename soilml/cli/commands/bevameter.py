@@ -30,15 +30,16 @@ Several tables of a kind are taken together; their columns tell which kind.
 PLATES.csv has test, sinkage_m, pressure_Pa or load_N, and the plate:
 plate_radius_m, plate_area_m2 of a round plate, or plate_width_m and
 plate_length_m. SHEAR.csv has test, normal_stress_Pa, shear_displacement_m and
-shear_stress_Pa; for a ring inner_radius_m, outer_radius_m, angle_rad, torque_Nm,
-and load_N or normal_stress_Pa. A blank displacement or angle marks the steady
-end of a test. Without them each row is the strength of a test, and K is not
-measured. Other names are taken where the header states units, such as z [mm].
+shear_stress_Pa; for a ring inner_radius_m, outer_radius_m, angle_rad,
+torque_Nm, and load_N or normal_stress_Pa. A blank displacement or angle marks
+the steady end of a test. Without them each row is the strength of a test, and
+K is not measured. Other names are taken where the header states units, such as
+z [mm].
 
 Ranges follow from how tests scatter. The second range is where the value at
 another place of the soil would lie, and is the prior that --out writes for
-identify and gap, with [[soil.test]]. With --model, SOIL.toml is that model file
-with this soil; without it, [soil] with priors and tests alone.
+identify and gap, with [[soil.test]]. With --model, SOIL.toml is that model
+file with this soil; without it, [soil] with priors and tests alone.
 """
 #: Bounds of columns that differ from those of measured runs: a plate starts without load.
 LIMITS = {
@@ -110,8 +111,7 @@ def _tables(args: argparse.Namespace) -> tuple[Table | None, Table | None, list[
 
     Raises the error of the first table where none can be used.
     """
-    from soilml.identification.bevameter.plate_tests import read_plate_tests
-    from soilml.identification.bevameter.shear_tests import read_shear_tests
+    from soilml.identification.bevameter.tables import read_plate_tests, read_shear_tests
     from soilml.remarks import Remark
 
     found: dict[str, list[Table]] = {}

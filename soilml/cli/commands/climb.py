@@ -29,12 +29,13 @@ ROVER.toml describes a rover with four wheels:
                 normal_Pa = "5 %", entry_angle_rad, speed_scale, front_load
 
 RUNS.csv has a row for each wheel of each steady climb: run, wheel (front or
-rear), slope_rad, and either slip or speed_m_s and rim_speed_m_s. STRESS.csv has
-a row for each sample: run, wheel, angle_rad, normal_Pa, and slip where the run
-is no climb (imposed slip on level ground).
+rear), slope_rad, and either slip or speed_m_s and rim_speed_m_s. STRESS.csv
+has a row for each sample: run, wheel, angle_rad, normal_Pa, and slip where the
+run is no climb (imposed slip on level ground).
 
 Each slope gives one equation, so three unknowns need three slopes. The bands
-are 90 % intervals. FOLDER receives report.html, climb.json, curve.csv, climbs.csv.
+are 90 % intervals. FOLDER receives report.html, climb.json, curve.csv,
+climbs.csv.
 """
 ARGUMENTS = (
     ("rover ROVER.toml", "rover, soil and noise", InputFile),

@@ -14,8 +14,9 @@ released model files and file names. For a shell, and for good:
   eval "$(soilml setup completion bash)"             # or zsh
   soilml setup completion fish | source
 
-  soilml setup completion bash > ~/.local/share/bash-completion/completions/soilml
-  soilml setup completion zsh  > ~/.zfunc/_soilml    # a folder of fpath, before compinit
+  soilml setup completion bash \\
+      > ~/.local/share/bash-completion/completions/soilml
+  soilml setup completion zsh > ~/.zfunc/_soilml     # in fpath, before compinit
   soilml setup completion fish > ~/.config/fish/completions/soilml.fish
 
 Print it again after an update of soilml, which may have other commands.

@@ -44,9 +44,9 @@ number, a range that is searched, or { values = [...] }:
   least = "width" # or energy, torque, ...
 
 The best design meets the goal with the probability 1 - risk and has the least
-of `least`; where none does, it is the likeliest. The margin is the largest pull
-less the weight along the slope. The front has the designs that no other one
-beats in both margin and `least`.
+of `least`; where none does, it is the likeliest. The margin is the largest
+pull less the weight along the slope. The front has the designs that no other
+one beats in both margin and `least`.
 """
 ARGUMENTS = (
     ("study ROVER.toml", "rover, wheel, soil and goal", InputFile),

@@ -20,10 +20,10 @@ simulator. It is code from the model file, and may do all that you may.
   soilml plan runs MODEL.toml --out design.csv   the runs, as a file
 
 The first runs fill the space evenly. Where the table exists, further runs are
-those at which the emulator of the runs is least sure. The error of the emulator
-is printed: it is a part of every interval. A design of --out has no outputs;
-add torque_Nm, drawbar_pull_N and sinkage_m, as far as the simulator has them,
-and store it as the table of [simulator].
+those at which the emulator of the runs is least sure. The error of the
+emulator is printed: it is a part of every interval. A design of --out has no
+outputs; add torque_Nm, drawbar_pull_N and sinkage_m, as far as the simulator
+has them, and store it as the table of [simulator].
 """
 ARGUMENTS = (
     ("model MODEL.toml", "gear, soil, priors and [simulator]", InputFile),

@@ -11,9 +11,9 @@ from soilml.errors import SoilmlError
 
 DESCRIPTION = """\
 Check this installation: which libraries are present and in which version, what
-cannot be done without the missing ones, and whether a released model file gives
-its known answers on this machine. The exit status is 1 where something that the
-installed parts need does not work.
+cannot be done without the missing ones, and whether a released model file
+gives its known answers on this machine. The exit status is 1 where something
+that the installed parts need does not work.
 """
 #: What needs each library, beside the board's own two.
 USES = {
@@ -22,7 +22,6 @@ USES = {
     "scipy": "identify, gap, pull, generate",
     "pyarrow": "Parquet tables; generate, train",
     "python-calamine": "spreadsheets (.xlsx)",
-    "rich": "progress bars",
     "pint": "import",
     "h5py": "import of MATLAB 7.3",
     "mcap": "import of MCAP",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import re
+import textwrap
 
 from soilml.cli.options import OPTIONAL
 from soilml.errors import InputError, did_you_mean
@@ -14,6 +16,21 @@ List the effects that [[effect]] in a model file may name.
   soilml show effects slip-sinkage    one effect: parameters, units, bounds,
                                  equation, source
 """
+#: What replaces commands of LaTeX, in this order; inner braces go first.
+_PLAIN = (
+    (r"\\(left|right)(?![a-z])|\\[;,!]|\\q?quad *", ""),
+    (r"\\tfrac(\d)(\d)", r"\1/\2"),
+    (r"([\^_]|sqrt)\{([^{}]*)\}", r"\1(\2)"),
+    (r"\\frac\{(\w+)\}", r"\1 / "),
+    (r"\\frac\{([^{}]*)\}", r"(\1) / "),
+    (r"/ \{(\w+)\}", r"/ \1"),
+    (r"/ \{([^{}]*)\}", r"/ (\1)"),
+    (r"\\text\{([^{}]*)\}", r"\1"),
+    (r"\\leftarrow", "<-"),
+    (r"\\var(?=phi)", r"\\"),
+    (r"(?<=[a-z\d])\\(?=[a-z])", " "),
+    (r"\\", ""),
+)
 ARGUMENTS = (
     ("name", "name of the effect to show", OPTIONAL),
     "effects",
@@ -65,14 +82,28 @@ def run(args: argparse.Namespace) -> int:
         print(f"uses, where known: {', '.join(COVARIATES[field] for field in about.uses)}")
     print(f"distinguished from others by: {about.isolate}\nsource: {about.source}\n")
     print(format_table(("parameter", "what", "default", "bounds", "unit"), rows, text_columns=2))
-    print(
-        f"\n{_dedented(cls.__doc__ or '')}\n\nIn a model file:\n\n[[effect]]\nname = {args.name!r}"
-    )
+    print(f"\n{_plain(cls.__doc__ or '')}\n\nIn a model file:\n\n[[effect]]\nname = {args.name!r}")
     for name, value in cls.about.reference.items():
         print(f"{name} = {value:g}")  # in SI units, as a model file has it
     return 0
 
 
-def _dedented(text: str) -> str:
-    lines = text.strip().splitlines()
-    return "\n".join([lines[0], *[line.removeprefix("    ") for line in lines[1:]]])
+def _plain(docstring: str) -> str:
+    """A docstring for a terminal: without its indentation, formulas in plain characters."""
+    first, *more = docstring.strip().splitlines()
+    text = "\n".join([first, *[line.removeprefix("    ") for line in more]])
+    return re.sub(
+        r"\.\. math::\s+(.+?)(?=\n\n\S|\Z)", lambda found: _formula(found[1]), text, flags=re.S
+    )
+
+
+def _formula(latex: str) -> str:
+    r"""A formula of LaTeX in plain characters, indented.
+
+    >>> _formula(r"\theta \leftarrow \frac{a}{1 - e^{-b}}, \quad m = \sqrt{n}")
+    '    theta <- a / (1 - e^(-b)), m = sqrt(n)'
+    """
+    for pattern, by in _PLAIN:
+        while latex != (latex := re.sub(pattern, by, latex)):
+            pass
+    return textwrap.indent("\n".join(line.strip() for line in latex.splitlines()), "    ")

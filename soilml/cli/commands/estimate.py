@@ -27,8 +27,8 @@ are those of the onboard runtime.
 Without a table, one line says what the file is for: wheel, effects and priors.
 --model compares them with those of your model file, and refuses another wheel.
 
-Each row gives mean, standard deviation (_std) and 90 % interval (_p05, _p95) of
-every parameter, and in_range: 0 where the readings lie outside the training
+Each row gives mean, standard deviation (_std) and 90 % interval (_p05, _p95)
+of every parameter, and in_range: 0 where the readings lie outside the training
 data; the estimate is then the prior. A single row is close to the prior. --by
 run pools all rows of a run, and --by all those of all runs, on one soil.
 

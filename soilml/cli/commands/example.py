@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 DESCRIPTION = """\
 Write an example into a folder, and say which command to run on it.
 
-  soilml example FOLDER               a campaign whose wheel does what its model lacks
-  soilml example log FOLDER           the recording of a rig, in the units of its maker
+  soilml example FOLDER               a campaign whose model lacks an effect
+  soilml example log FOLDER           the recording of a rig, in its own units
   soilml example rover FOLDER         a rover, and rows of one of its wheels
 
 and what the source papers measured:
 
-  soilml example sensor-wheel FOLDER  readings of four sensors in the rim of a wheel
-  soilml example climb FOLDER         gentle climbs of a rover with two such wheels
+  soilml example sensor-wheel FOLDER  readings of four sensors in a wheel's rim
+  soilml example climb FOLDER         gentle climbs of a rover with such wheels
   soilml example wheel-leg FOLDER     strides of a wheel-leg on two soils
   soilml example track FOLDER         the log of a tracked robot's pulls
 

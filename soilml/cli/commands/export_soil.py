@@ -10,15 +10,16 @@ from soilml.cli.options import REPEATED, REQUIRED, InputFile, folder_outputs
 from soilml.errors import InputError
 
 DESCRIPTION = """\
-Write the soil of FIT.json in the units and names of a simulator, with a README of
-the equations, of what is ignored and of what no wheel test reveals.
+Write the soil of FIT.json in the units and names of a simulator, with a README
+of the equations, of what is ignored and of what no wheel test reveals.
 
   soilml identify MODEL.toml RUNS.csv --out result.json
   soilml export soil result.json --to chrono --out scm
   soilml export soil result.json --to chrono --out scm --draws 50
   soilml export soil MODEL.toml --to gazebo --out gazebo
 
-FIT.json is the file that `soilml identify --out` wrote, or a model file. Targets:
+FIT.json is the file that `soilml identify --out` wrote, or a model file.
+Targets:
   chrono      Project Chrono, deformable terrain SCM
   chrono-crm  Project Chrono, continuum terrain CRM
   gazebo      soil_params.yaml of gz-terramechanics, and friction of SDFormat

@@ -35,11 +35,11 @@ error in them appears as an effect.
 
 RUNS.csv has the columns run, slip, load_N, torque_Nm, and optionally
 drawbar_pull_N, sinkage_m, speed_m_s (below zero in reverse), pass,
-slip_angle_rad, time_s and <column>_std. FOLDER receives report.html (start here),
-gap.json, model.toml (the model with the missing effect, or all likely
+slip_angle_rad, time_s and <column>_std. FOLDER receives report.html (start
+here), gap.json, model.toml (the model with the missing effect, or all likely
 explanations with their weights) and next_runs.csv (runs to measure next). The
-exit status is 0 whatever the result, 3 where the data cannot be analysed, and 2
-for bad input.
+exit status is 0 whatever the result, 3 where the data cannot be analysed, and
+2 for bad input.
 
 Runs of several wheels on one soil: write each as [gears.NAME] in MODEL.toml,
 and name it in the column gear. An effect of one wheel is then grousers@NAME.

@@ -5,15 +5,12 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from soilml.cli.options import SEVERAL, InputFile
 from soilml.errors import InputError
-from soilml.io.atomic_files import output_files, save_text, write_files
+from soilml.io.atomic_files import output_files, save_text
 
-if TYPE_CHECKING:
-    from soilml.log_import.result import ImportedLog
-
+FORMATS = ("table", "csv", "json")
 #: Endings of the table, its report and the errors that all rows share.
 SUFFIXES = (".csv", ".report.html", ".report.json", ".bias.toml")
 DESCRIPTION = """\
@@ -25,28 +22,24 @@ deviations.
   soilml import LOG... --map MAP.toml --out RUNS.csv
 
 Logs are CSV and other text, Parquet, spreadsheets (.xlsx; one sheet of several
-as BOOK.xlsx#SHEET), MATLAB files, MCAP and bags of ROS 1 and 2
-(pip install '.[logs]'); each file is a run, unless the map says otherwise.
-MAP.toml says which column or topic is which quantity, in which unit,
-and what stands between: radius, gear ratio, torque constant, tare, each with
-its uncertainty. --init writes one with guesses and their reasons; without --out
-it prints it. A guess that neither its name and unit nor another channel supports
-is marked with CHANGE; --explain prints what speaks for each.
+as BOOK.xlsx#SHEET), MATLAB files, MCAP and bags of ROS 1 and 2 (pip install
+'.[logs]'); each file is a run, unless the map says otherwise. MAP.toml says
+which column or topic is which quantity, in which unit, and what stands
+between: radius, gear ratio, torque constant, tare, each with its uncertainty.
+--init writes one with guesses and their reasons; without --out it prints it. A
+guess that neither its name and unit nor another channel supports is marked
+with CHANGE; --explain prints the evidence.
 
 Beside RUNS.csv stand RUNS.report.html (pictures, what was left out and why),
 RUNS.report.json, and RUNS.bias.toml: the errors that all rows share, as [bias]
 of a model file. A map that cannot be right is refused with the likely cause;
 --accept imports it as it is.
 """
-#: Columns of the table on the terminal; the file has all.
-_SHOWN = ("run", "slip", "slip_std", "load_N", "torque_Nm", "torque_Nm_std", "drawbar_pull_N",
-          "sinkage_m")  # fmt: skip
-_MOST_SHOWN = 40
 _MOST_NAMED = 4  # Most logs that the next command names
 ARGUMENTS = (
     ("files LOG", "logs, of any kind", InputFile, SEVERAL),
     ("--init", "write a commented map with guesses, and no table"),
-    ("--explain", "with --init: print what speaks for each guess"),
+    ("--explain", "with --init: print the evidence for each guess"),
     ("--map MAP.toml", "how the logs are read", InputFile),
     ("--out RUNS.csv", "write table and report; with --init, the map"),
     ("--accept", "import although the map looks wrong"),
@@ -62,7 +55,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
             raise InputError(f"{args.out} exists; --init would overwrite it: give another name")
         return output_files(args.out, ".toml")
     if args.explain:
-        raise InputError("--explain prints what speaks for each guess of --init; give both")
+        raise InputError("--explain prints the evidence for each guess of --init; give both")
     if args.map is None:
         raise InputError("--map is missing; soilml import --init LOG... --out MAP.toml writes one")
     # `import *.csv` a second time finds the table of the first time among the logs
@@ -85,10 +78,8 @@ def _is_that_table(file: str, out: str | None) -> bool:
 
 def run(args: argparse.Namespace) -> int:
     """Write the map, or the table and its report."""
-    from soilml.cli.output import origin_of, tell
+    from soilml.cli.output import deliver, origin_of, tell
     from soilml.cli.progress import stage_progress
-    from soilml.cli.screen import is_terminal
-    from soilml.io.text_tables import csv_text
     from soilml.log_import.workflow import import_log
     from soilml.optional_imports import need
     from soilml.report.page import json_text, page, report_entry
@@ -99,37 +90,25 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         for library in ("jinja2", "matplotlib"):
             need(library, "import")
+    others: dict[str, str] = {}
     with stage_progress() as progress:
         found = import_log(args.files, args.map, accept=args.accept, progress=progress)
-        html, entry = "", {}
+        report = found.report()
         if args.out is not None:
             progress("drawing the report", 0, 1)
-            report, origin = found.report(), origin_of(args)
-            html, entry = page(report, origin), {"report": report_entry(report, origin)}
-    _print_remarks(found)
-    if args.out is None:
-        _print_table(found)
-        return 0
-    files = output_files(args.out, *SUFFIXES)
-    texts = (
-        csv_text(found.table.columns),
-        html,
-        json_text(found.as_json() | entry),
-        found.bias_toml(),
-    )
-    write_files(dict(zip(files, texts, strict=True)))
-    if is_terminal():
-        _print_table(found)
-    tell(
-        f"{_counted(len(found.table), 'row')} of {_counted(found.runs, 'run')} written to "
-        f"{args.out}; report: {files[1]}; errors that all rows share, for the model file: "
-        f"{files[3]}. Next: soilml identify MODEL.toml {args.out}"
-    )
+            origin = origin_of(args)
+            entry = {"report": report_entry(report, origin)}
+            texts = page(report, origin), json_text(found.as_json() | entry), found.bias_toml()
+            names = map(str, output_files(args.out, *SUFFIXES)[1:])
+            others = dict(zip(names, texts, strict=True))
+    deliver(args, report, found.as_json(), found.table.columns, others=others)
+    if others:
+        html, _, bias = others
+        tell(
+            f"\n{args.out} written; report: {html}; errors that all rows share, for the model "
+            f"file: {bias}. Next: soilml identify MODEL.toml {args.out}"
+        )
     return 0
-
-
-def _counted(number: int, name: str) -> str:
-    return f"{number} {name}{'s' * (number != 1)}"
 
 
 def _init(args: argparse.Namespace) -> int:
@@ -137,7 +116,7 @@ def _init(args: argparse.Namespace) -> int:
 
     from soilml.cli.output import tell, write_stdout
     from soilml.cli.progress import stage_progress
-    from soilml.log_import.new_map import draft_map
+    from soilml.log_import.guesses.map_guess import draft_map
 
     with stage_progress() as progress:
         draft = draft_map(args.files, progress)
@@ -153,30 +132,3 @@ def _init(args: argparse.Namespace) -> int:
     shown = shlex.join(logs) if len(logs) <= _MOST_NAMED else "LOG..."
     tell(f"{args.out} written; {todo}; then: soilml import {shown} --map {args.out} --out runs.csv")
     return 0
-
-
-def _print_remarks(found: ImportedLog) -> None:
-    from soilml.cli.output import tell
-
-    for text in (*found.implausible, *found.remarks):
-        tell(f"! {text}")
-    if not found.series:
-        return
-    short = sum(stop.stop - stop.start for _, stop in found.left_out())
-    tell(f"{short:.0f} s were left out; the report says why")
-
-
-def _print_table(found: ImportedLog) -> None:
-    from soilml.cli.output import write_stdout
-    from soilml.cli.screen import is_terminal
-    from soilml.io.text_tables import csv_text
-
-    table = found.table
-    if not is_terminal():
-        write_stdout(csv_text(table.columns))
-        return
-    from soilml.report.tables import ReportTable
-
-    columns = {name: table[name][:_MOST_SHOWN] for name in _SHOWN if name in table}
-    more = f"and {len(table) - _MOST_SHOWN} more\n" if len(table) > _MOST_SHOWN else ""
-    write_stdout(f"{ReportTable.of('rows', columns).text()}\n{more}")

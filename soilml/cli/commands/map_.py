@@ -23,8 +23,8 @@ and time_s. Positions are those of the wheel's contact, or those of the rover's
 origin where heading_rad and [rover.wheels] say where the wheels are.
 
 ROVER.toml has [gear], [soil], [soil.prior], [noise], and [rover] for slopes.
-The soil is estimated by the released file for wheels of any size, or by that of
---from, in stretches between changes that `SoilTracker` finds. A Gaussian
+The soil is estimated by the released file for wheels of any size, or by that
+of --from, in stretches between changes that `SoilTracker` finds. A Gaussian
 process over position joins them.
 
 The folder has map.tif (GeoTIFF), costmap.yaml and costmap.pgm for Nav2, whose

@@ -32,22 +32,23 @@ def run(args: argparse.Namespace) -> int:
         raise ModelFileError(
             "this installation has no released model files; train one with soilml train"
         )
-    header = ("name", "gear", "reads", "estimates", "readings", "kB")
+    header = ("name", "gear: r, w", "reads", "estimates", "set", "kB")
     rows = []
     for name, file in files.items():
         estimator = Estimator.load(file)
         gear = dict(json.loads(estimator.metadata["gear"]))
-        sizes = [f"{k[0]} {gear[k]:g}" for k in ("radius", "width") if gear.get(k)]
+        sizes = [f"{1e3 * gear[k]:.3g}" for k in ("radius", "width") if gear.get(k)]
         rows.append(
             (
                 name,
                 f"{gear.get('type', '')} {', '.join(sizes) or 'of any size'}",
                 ", ".join(estimator.inputs),
                 ", ".join(QUANTITIES[n].symbol if n in SHEAR else n for n in estimator.names),
-                "one by one" if estimator.sets is None else "together",
+                "no" if estimator.sets is None else "yes",
                 f"{file.stat().st_size / 1000:.0f}",
             )
         )
     print(format_table(header, rows, text_columns=5))
-    print("r, w: radius and width in m; c, phi, K: cohesion, friction angle, shear modulus")
+    print("r, w: radius and width in mm; set: whether rows of a soil are pooled")
+    print("c, phi, K: cohesion, friction angle, shear modulus")
     return 0

@@ -18,11 +18,11 @@ FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
 Compute the numbers that the source papers print, and compare them.
 
-  soilml paper numbers                        all papers; takes about forty seconds
-  soilml paper numbers nagatani2009           one paper
-  soilml paper numbers --summary              how many numbers of each status
-  soilml paper numbers comin2017 --all        every number, also those not computed
-  soilml paper numbers --out papers.csv       every number, as CSV
+  soilml paper numbers                  all papers; about ten seconds
+  soilml paper numbers nagatani2009     one paper
+  soilml paper numbers --summary        how many numbers of each status
+  soilml paper numbers comin2017 --all  every number, also those not computed
+  soilml paper numbers --out papers.csv every number, as CSV
 
 status: reproduced     computed without the number, within the tolerance
         recovered      the number, or what it follows from, was put into a
@@ -42,7 +42,6 @@ Only the first says that a model predicts what the authors found. The tolerance
 is the largest permitted difference, in the number's unit or in per cent of it.
 A number that a paper prints twice, or that follows from another, counts once.
 """
-WIDTH = 100
 OMITTED = ("given", "not_computed")  # Statuses of rows that --all alone lists
 ARGUMENTS = (
     ("paper", f"paper to compute: {', '.join(PAPERS)}", OPTIONAL),
@@ -67,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         for row in rows:
             found.append(row.compare())
             progress(len(found))
-    as_text = args.summary or SCREEN.form_of_rows() == "table"
+    as_text = args.summary or SCREEN.form == "table"
     if args.out is not None or not as_text:
         write_columns(_columns(found), args.out)
     if as_text:
@@ -139,6 +138,8 @@ def _omitted(found: list[Comparison]) -> list[str]:
 
 
 def _wrap(text: str) -> str:
+    from soilml.report.aligned_text import WIDTH
+
     return textwrap.fill(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
 
 

@@ -29,10 +29,10 @@ with 90 % bands.
   soilml pull ROVER.toml RUNS.csv --slope 0,10,15 --gravity moon
   soilml pull MODEL.toml RUNS.csv --load 20 --gravity 1.62 --tested-at 9.81
 
-RUNS.csv is that of `soilml identify`. Soil, effects that the model may lack and
-its smooth error are drawn from one posterior given the rows, or the soil from
-the estimate of a trained file (--from). All rows are assumed to come from one
-soil, unless --by run asks for a result for each run.
+RUNS.csv is that of `soilml identify`. Soil, effects that the model may lack
+and its smooth error are drawn from one posterior given the rows, or the soil
+from the estimate of a trained file (--from). All rows are assumed to come from
+one soil, unless --by run asks for a result for each run.
 
 Loads are those of the rows, unless --load names others; slips reach 0.6, the
 highest measured slip, or --slip-limit. The bands include errors of the model,
@@ -42,8 +42,8 @@ A model file with [rover] answers for the whole rover, unless --load or --gear
 names one wheel: the slip that slopes need, the margin of pull, the work of the
 wheels for each metre, the steepest slope and the best slip.
 
---gravity predicts for another gravity than that of the rows. How a soil changes
-with it is disputed: by default the law is open, and in the bands.
+--gravity predicts for another gravity than that of the rows. How a soil
+changes with it is disputed: by default the law is open, and in the bands.
 
 pull, p05, p95 are the median and the 90 % band; `prior` is the band before any
 measurement. The CSV file has a row for each load and slip, in SI units.

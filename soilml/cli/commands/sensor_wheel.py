@@ -10,23 +10,25 @@ from soilml.errors import InputError
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
-Solve the force balance of each run of a wheel whose normal stress was measured:
-k_x and M, the true over the measured stress. The k_x of one run, the
+Solve the force balance of each run of a wheel whose normal stress was
+measured: k_x and M, the true over the measured stress. The k_x of one run, the
 reference, then predicts drawbar pull and slope of all (Nagatani et al. 2009).
 
   soilml paper sensor-wheel MODEL.toml RUNS.csv --readings READINGS.csv
-  soilml paper sensor-wheel MODEL.toml RUNS.csv --stress STRESS.csv --reference flat
+  soilml paper sensor-wheel MODEL.toml RUNS.csv --stress STRESS.csv \\
+      --reference flat
 
-MODEL.toml has the wheel and the soil: cohesion and friction angle are used, and
-all of it for the pull by Bekker's stress, which stands beside. RUNS.csv has a
-row for each run: run, slip, load_N (the weight on the wheel), slope_rad (0 if
-absent), and optionally slip_std, load_N_std and slope_rad_std.
+MODEL.toml has the wheel and the soil: cohesion and friction angle are used,
+and all of it for the pull by Bekker's stress, which stands beside. RUNS.csv
+has a row for each run: run, slip, load_N (the weight on the wheel), slope_rad
+(0 if absent), and optionally slip_std, load_N_std and slope_rad_std.
 
 READINGS.csv has a row for each sample of each sensor over some turns: run,
-angle_rad (from straight down, positive forward), sensor (1, 2, ...) and force_N.
-They are averaged by angle, and the averaging over the sensor's disc (--diameter)
-is removed. STRESS.csv in its place has run, angle_rad and normal_Pa, optionally
-normal_Pa_std; its averaging is removed where --diameter is given.
+angle_rad (from straight down, positive forward), sensor (1, 2, ...) and
+force_N. They are averaged by angle, and the averaging over the sensor's disc
+(--diameter) is removed. STRESS.csv in its place has run, angle_rad and
+normal_Pa, optionally normal_Pa_std; its averaging is removed where --diameter
+is given.
 
 Standard deviations follow from the errors of stress, slip, weight and slope;
 those of cohesion and friction angle are not included. The reference is the run

@@ -18,7 +18,7 @@ List the catalogue of published soils. Values are in SI units; * marks a value
 that is not printed in the paper and is assumed.
 
   soilml show soils                      all soils, one line each
-  soilml show soils wong1989/dry_sand    one soil, with its source and every value
+  soilml show soils wong1989/dry_sand    one soil, its source and all values
 """
 ARGUMENTS = (("name", "PAPER/SOIL, the name of the soil to show", OPTIONAL),)
 
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
 def _list(entries: list[SoilEntry]) -> str:
     from soilml.report.aligned_text import format_table
 
-    header = ("soil", "c kPa ", "phi deg ", "K mm ", "n ", "what")
+    header = ("soil", "c ", "phi ", "K ", "n ", "what")
     rows = []
     for entry in entries:
         values = (
@@ -54,7 +54,10 @@ def _list(entries: list[SoilEntry]) -> str:
             for field in ("cohesion", "friction_angle", "shear_modulus", "n")
         )
         rows.append((entry.name, *values, entry.text))
-    notes = "* not in the paper: assumed. `soilml show soils NAME` has kc, kphi, and the source."
+    notes = (
+        "c in kPa, phi in degrees, K in mm; * not in the paper: assumed.\n"
+        "`soilml show soils NAME` has kc, kphi, and the source."
+    )
     return f"{format_table(header, rows, last_left=True)}\n{notes}"
 
 

@@ -10,23 +10,25 @@ from soilml.errors import InputError
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
-Evaluate the log of a tracked robot that pulls a payload (Wang, Yan and Du 2018):
-slip from two travels, pull from the stationary part of the tension, sinkage of
-the rear wheel from two lasers; fit the free parameters of the soil to the pulls.
+Evaluate the log of a tracked robot that pulls a payload (Wang, Yan and Du
+2018): slip from two travels, pull from the stationary part of the tension,
+sinkage of the rear wheel from two lasers; fit the free parameters of the soil
+to the pulls.
 
-  soilml paper track MODEL.toml LOG.csv --mass 130 --spacing 0.6 --picture track.png
+  soilml paper track MODEL.toml LOG.csv --mass 130 --spacing 0.6
   soilml paper track MODEL.toml LOG.csv --mass 130 --grousers 0.05,0.01,0.97,0.1
 
 MODEL.toml has the track, the soil, and [soil.prior] for what is to be fitted.
-LOG.csv has rows of run, time_s, belt_travel_m, travel_m (both m since the start)
-and tension_N, of both tracks; and front_laser_m, rear_laser_m and
+LOG.csv has rows of run, time_s, belt_travel_m, travel_m (both m since the
+start) and tension_N, of both tracks; and front_laser_m, rear_laser_m and
 inclination_rad (tail down) where they were measured, --spacing apart.
 
 A row of the output is a run: slip, pull of one track, sinkage, what the model
 predicts of them, and the angles at which the belt meets and leaves the soil
-(fig. 8). The picture has pull and sinkage, the line of the belt (fig. 7) and the
-angles. --grousers adds the pull of discrete grousers (eqs. 10 to 14), with f_g,
-the friction of soil that has yielded, as an input: the paper does not print it.
+(fig. 8). The picture has pull and sinkage, the line of the belt (fig. 7) and
+the angles. --grousers adds the pull of discrete grousers (eqs. 10 to 14), with
+f_g, the friction of soil that has yielded, as an input: the paper does not
+print it.
 """
 ARGUMENTS = (
     ("model MODEL.toml", "track, soil and its priors", InputFile),

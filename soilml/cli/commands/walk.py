@@ -14,23 +14,25 @@ if TYPE_CHECKING:
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
-Simulate wheel-legs by resistive-force theory (Li, Zhang and Goldman 2013; Comin
-and Saaj 2017, eqs. 4 to 11), at every combination of feet, numbers of legs,
-grounds and commanded slips.
+Simulate wheel-legs by resistive-force theory (Li, Zhang and Goldman 2013;
+Comin and Saaj 2017, eqs. 4 to 11), at every combination of feet, numbers of
+legs, grounds and commanded slips.
 
   soilml paper walk --foot LTF,CIF --stiffness 0.4e6:1e6:4 --picture feet.png
   soilml paper walk --foot none --legs 1:6:6 --stiffness 0.7e6
   soilml paper walk --ground SSC-1,ES-3 --slip 0,0.25,0.5 --over-time turn.csv
 
 Feet are none, LTF (Load Testing Foot), SRF and CIF (table III); grounds SSC-1,
-SSC-2, SSC-3 and ES-3 (table I), or --stiffness, the stress in N/m^3 of depth under
-a flat plate. A row has means, root mean squares and largest values over the last
-full turn, and the sinkage at midstance. Without --slip the wheel rolls freely.
---over-time has the motion of that turn. The picture shows it, or, where legs,
-stiffness or slip have three values or more, the row's values against them.
+SSC-2, SSC-3 and ES-3 (table I), or --stiffness, the stress in N/m^3 of depth
+under a flat plate. A row has means, root mean squares and largest values over
+the last full turn, and the sinkage at midstance. Without --slip the wheel
+rolls freely. --over-time has the motion of that turn. The picture shows it,
+or, where legs, stiffness or slip have three values or more, the row's values
+against them.
 
-The stress is proportional to the depth: --offset adds the stress at the surface.
-Neighbouring legs do not act on each other, and the body is a plate below the hub.
+The stress is proportional to the depth: --offset adds the stress at the
+surface. Neighbouring legs do not act on each other, and the body is a plate
+below the hub.
 """
 ARGUMENTS = (
     ("--foot A,B,... (LTF)", "feet"),

@@ -14,17 +14,17 @@ if TYPE_CHECKING:
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
 Estimate friction angle and normal stiffness (the stress 1 cm deep) of one soil
-from the strides of a wheel-leg, by the relations that Comin and Saaj 2017 print,
-and what they mean for a heavy rover that is to follow.
+from the strides of a wheel-leg, by the relations that Comin and Saaj 2017
+print, and what they mean for a heavy rover that is to follow.
 
   soilml paper wheel-leg STRIDES.csv
-  soilml paper wheel-leg STRIDES.csv --by run --torque-model empirical --out soil.csv
+  soilml paper wheel-leg STRIDES.csv --by run --torque-model empirical
 
 STRIDES.csv has a row for each stride: run, slip, and one or more of torque_Nm
 (at midstance), vibration_m_s2 (largest acceleration after it) and sinkage_m
 (at midstance); blank where not measured. `soilml import` makes it from a log.
-`fused` is the estimate by all sensors (eq. 30). Standard deviations include the
-error that all strides on a soil share (table VIII).
+`fused` is the estimate by all sensors (eq. 30). Standard deviations include
+the error that all strides on a soil share (table VIII).
 
 The last row of each soil has k_phi and the pull efficiency of a wheel of a
 300 kg rover (eq. 32) with its class. n, cohesion and shear modulus, which
@@ -34,7 +34,7 @@ strides do not show, are uniform over the four soils of the source, unless
 On a known soil the same relations give the slip of each stride:
 
   soilml paper wheel-leg STRIDES.csv --known SSC-2
-  soilml paper wheel-leg STRIDES.csv --known 35.8,22000     degrees and Pa, 1 cm deep
+  soilml paper wheel-leg STRIDES.csv --known 35.8,22000   degrees, Pa 1 cm deep
 
 The relations are of one wheel-leg: five legs, Load Testing Feet, 3.75 kg. For
 another train a file on its strides: soilml train slip_torque.

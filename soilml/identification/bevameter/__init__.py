@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.identification.bevameter.plate_tests import (
+from soilml.identification.bevameter.laws import (
     PressureSinkageFit,
+    ShearFit,
     fit_pressure_sinkage,
-    read_plate_tests,
+    fit_shear_strength,
 )
 from soilml.identification.bevameter.remarks import plate_remarks, shear_remarks
 from soilml.identification.bevameter.result import BevameterResult
-from soilml.identification.bevameter.shear_tests import (
-    ShearFit,
-    fit_shear_strength,
-    read_shear_tests,
-)
 from soilml.identification.bevameter.soil_section import (
     plate_section,
     pressure_test,
@@ -23,6 +19,7 @@ from soilml.identification.bevameter.soil_section import (
     strength_test,
     within_bounds,
 )
+from soilml.identification.bevameter.tables import read_plate_tests, read_shear_tests
 from soilml.io.read_table import Rows, as_table
 from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import SoilTest

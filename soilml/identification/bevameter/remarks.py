@@ -8,9 +8,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.identification.bevameter.plate_tests import PressureSinkageFit
+from soilml.identification.bevameter.laws import PressureSinkageFit, ShearFit
 from soilml.identification.bevameter.scatter import is_level
-from soilml.identification.bevameter.shear_tests import ShearFit
 from soilml.remarks import Remark
 
 #: Change of the exponent between the shallower and the deeper half of a curve from which the law is
@@ -36,11 +35,11 @@ def _kpa(stress: float) -> str:
 
 def plate_remarks(fit: PressureSinkageFit) -> Iterator[Remark]:
     """Remarks on plate tests."""
-    largest = max(float(test.pressure.max()) for test in fit.tests)
+    largest = max(float(test.stress.max()) for test in fit.tests)
     if largest < ODD_PRESSURE:
         text = f"the largest pressure is {largest:.3g} Pa, which is very little: check that it is "
         yield Remark("doubtful-unit", f"{text}in Pa, not in kPa", ("pressure_Pa",))
-    deepest = max(float(test.sinkage[-1]) for test in fit.tests)
+    deepest = max(float(test.x[-1]) for test in fit.tests)
     text = "n and the moduli trade off, so each range alone is wide; they hold down to "
     text += f"{deepest:.3g} m, the deepest test"
     yield Remark("parameters-correlated", text, ("kc", "kphi", "n"), "note")
@@ -64,7 +63,7 @@ def plate_remarks(fit: PressureSinkageFit) -> Iterator[Remark]:
         )
         yield Remark("below-zero", f"{text}{fit.sizes[0]:.3g} m", ("kc",))
     yield from _repeats(
-        np.asarray([test.size for test in fit.tests]),
+        np.asarray([test.level for test in fit.tests]),
         np.exp([curve.log_pressure for curve in fit.curves]),
         [(b, f"with the plate of {b:.3g} m", f"pressure at {fit.depth:.3g} m") for b in fit.sizes],
         "no plate test was repeated: a usual scatter of 15 % in pressure is assumed",
@@ -105,7 +104,7 @@ def shear_remarks(fit: ShearFit) -> Iterator[Remark]:
     """Remarks on shear tests."""
     pairs = list(zip(fit.tests, fit.curves, strict=True))
     stresses = ("shear_stress_Pa", "normal_stress_Pa")
-    ratio = max(c.strength / t.normal_stress for t, c in pairs)
+    ratio = max(c.strength / t.level for t, c in pairs)
     if ratio > ODD_RATIO:
         text = f"the shear strength is {ratio:.3g} times the normal stress: check that both are "
         yield Remark("doubtful-unit", f"{text}in Pa", stresses)
@@ -132,7 +131,7 @@ def shear_remarks(fit: ShearFit) -> Iterator[Remark]:
             "doubtful-unit", f"{text}unit of the shear displacement", ("shear_displacement_m",)
         )
     yield from _repeats(
-        np.asarray([test.normal_stress for test in fit.tests]),
+        np.asarray([test.level for test in fit.tests]),
         np.asarray([curve.strength for curve in fit.curves]),
         [(sigma, f"at {_kpa(sigma)} kPa", "strength") for sigma in fit.stresses],
         "no shear test was repeated: the scatter is that of the tests about the line, and a usual "

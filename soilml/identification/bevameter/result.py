@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from soilml.identification.bevameter.plate_tests import PressureSinkageFit
+from soilml.identification.bevameter.laws import PressureSinkageFit, ShearFit
 from soilml.identification.bevameter.scatter import SpreadEstimate
-from soilml.identification.bevameter.shear_tests import ShearFit
 from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import SoilTest
 from soilml.remarks import Remark
@@ -121,7 +120,7 @@ def _plate_entries(fit: PressureSinkageFit) -> list[dict[str, Any]]:
     return [
         {
             "test": test.name,
-            "plate_m": test.size,
+            "plate_m": test.level,
             "n": curve.exponent,
             "k": math.exp(curve.log_pressure) * fit.depth**-curve.exponent,
             "misfit": curve.misfit,
@@ -134,7 +133,7 @@ def _shear_entries(fit: ShearFit) -> list[dict[str, Any]]:
     return [
         {
             "test": test.name,
-            "normal_stress_Pa": test.normal_stress,
+            "normal_stress_Pa": test.level,
             "strength_Pa": curve.strength,
             "shear_modulus_m": curve.modulus if test.has_curve else None,
             "misfit": curve.misfit,
@@ -165,14 +164,10 @@ def _draw(drawings: Sequence[Callable[[Any], None]], axes: Any) -> None:
 def _draw_plates(panel: Any, fit: PressureSinkageFit) -> None:
     kc, kphi = fit.moduli
     for test, curve in zip(fit.tests, fit.curves, strict=True):
-        (dots,) = panel.loglog(
-            1e3 * test.sinkage, 1e-3 * test.pressure, ".", label=short_label(test.name)
-        )
-        own = np.exp(curve.log_pressure) * (test.sinkage / fit.depth) ** curve.exponent
-        panel.loglog(1e3 * test.sinkage, 1e-3 * own, color=dots.get_color(), linewidth=0.8)
-    depth = np.geomspace(
-        min(t.sinkage[0] for t in fit.tests), max(t.sinkage[-1] for t in fit.tests)
-    )
+        (dots,) = panel.loglog(1e3 * test.x, 1e-3 * test.stress, ".", label=short_label(test.name))
+        own = np.exp(curve.log_pressure) * (test.x / fit.depth) ** curve.exponent
+        panel.loglog(1e3 * test.x, 1e-3 * own, color=dots.get_color(), linewidth=0.8)
+    depth = np.geomspace(min(t.x[0] for t in fit.tests), max(t.x[-1] for t in fit.tests))
     for size in fit.sizes:
         law = (kc / size + kphi) * depth**fit.exponent
         panel.loglog(1e3 * depth, 1e-3 * law, color="black", linewidth=2.0, alpha=0.6)
@@ -185,10 +180,10 @@ def _draw_plates(panel: Any, fit: PressureSinkageFit) -> None:
 
 def _draw_curves(panel: Any, fit: ShearFit) -> None:
     for test, curve in zip(fit.tests, fit.curves, strict=True):
-        shown = np.isfinite(test.displacement)
+        shown = np.isfinite(test.x)
         if not shown.any():
             continue
-        j = test.displacement[shown]
+        j = test.x[shown]
         (dots,) = panel.plot(1e3 * j, 1e-3 * test.stress[shown], ".", label=short_label(test.name))
         grid = np.linspace(0.0, float(j.max()), 200)
         own = curve.strength * -np.expm1(-grid / curve.modulus)
@@ -198,7 +193,7 @@ def _draw_curves(panel: Any, fit: ShearFit) -> None:
 
 
 def _draw_strengths(panel: Any, fit: ShearFit) -> None:
-    sigma = np.asarray([test.normal_stress for test in fit.tests])
+    sigma = np.asarray([test.level for test in fit.tests])
     strength = np.asarray([curve.strength for curve in fit.curves])
     panel.plot(1e-3 * sigma, 1e-3 * strength, "o", label="strength of each test")
     if fit.cohesion is not None and fit.friction_angle is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -39,11 +40,18 @@ class SpreadEstimate:
         return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
 
 
-def spread_estimate(value: float, mean: Floats, place: Floats, unit: str) -> SpreadEstimate:
-    """The estimate with the ranges of draws of the mean and of another place, (draws,) each."""
-    low, high = np.quantile(mean, [0.025, 0.975])
-    first, last = np.quantile(place, [0.025, 0.975])
-    return SpreadEstimate(value, (float(low), float(high)), (float(first), float(last)), unit)
+def spread_estimate(
+    value: float, mean: Floats, place: Floats, unit: str, also: Sequence[float] = ()
+) -> SpreadEstimate:
+    """The estimate with the ranges of draws of the mean and of another place, (draws,) each.
+
+    also: Values that both ranges contain too.
+    """
+    ends = (np.quantile(own, [0.025, 0.975]) for own in (mean, place))
+    first, second = (
+        (float(min(low, *also, low)), float(max(high, *also, high))) for low, high in ends
+    )
+    return SpreadEstimate(value, first, second, unit)
 
 
 def distinct_levels(values: Floats) -> tuple[float, ...]:
@@ -74,41 +82,55 @@ def relative_line(columns: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 @dataclass(frozen=True)
-class Scatter:
-    """Covariance (q, q) from test to test of q quantities, with its degrees of freedom."""
+class TestLine:
+    """A line through one value of each of N tests, and the mean of a second quantity of each.
 
-    covariance: Floats
-    degrees_of_freedom: float
-
-    def draws(self, mean_covariance: Floats) -> tuple[Floats, Floats]:
-        """Errors of the mean, (draws, p), and deviations of another test from it, (draws, q).
-
-        `mean_covariance` (p, p) is that of the estimated means for a scatter as estimated; both
-        follow Student's t distribution with one common unknown scale.
-        """
-        rng = np.random.default_rng(SEED)
-        p, q = len(mean_covariance), len(self.covariance)
-        z = rng.standard_normal((DRAWS, p + q))
-        freedom = self.degrees_of_freedom
-        scale = np.sqrt(freedom / rng.chisquare(freedom, DRAWS))[:, None]
-        mean = z[:, :p] @ _root(mean_covariance).T * scale
-        return mean, z[:, p:] @ _root(self.covariance).T * scale
-
-
-def pooled_scatter(residuals: Floats, usual: Floats, estimated: int) -> Scatter:
-    r"""Scatter from residuals of tests, (tests, q), and from what is usual.
-
-    .. math:: S = \frac{\nu_0 \, \mathrm{diag}(s_0^2) + \sum_i r_i r_i^T}{\nu_0 + \nu}
-
-    usual: Standard deviations s_0, (q,), that repeated tests of such a quantity usually have.
-    estimated: Number of means that were fitted to the tests; nu is the number of tests less this.
-
-    References: Gelman et al., Bayesian Data Analysis, 2013, section 2.6, scaled inverse chi-squared
-    prior.
+    coefficients: (p,). mean: Of the second quantity.
+    error: Draws (draws, p + 1) of the errors of both.
+    deviation: Draws (draws, 2) of another test from them: of the logarithm of the value, and of the
+        second quantity.
     """
-    freedom = max(len(residuals) - estimated, 0)
-    total = USUAL_FREEDOM * np.diag(usual**2) + residuals.T @ residuals
-    return Scatter(total / (USUAL_FREEDOM + freedom), USUAL_FREEDOM + freedom)
+
+    coefficients: Floats
+    mean: float
+    error: Floats
+    deviation: Floats
+
+    @staticmethod
+    def of(
+        columns: Floats, value: Floats, second: Floats, usual: Floats, *, above_zero: bool
+    ) -> TestLine:
+        r"""From columns (N, p) of the line, values (N,), and a second quantity (N,), maybe NaN.
+
+        .. math:: S = \frac{\nu_0 \, \mathrm{diag}(s_0^2) + \sum_i r_i r_i^T}{\nu_0 + \nu}
+
+        is the scatter from test to test, with the residuals r of both and the number nu of tests
+        less the p coefficients. Both draws follow Student's t distribution with one common scale.
+
+        usual: Standard deviations s_0, (2,), that repeated tests of such quantities usually have.
+        above_zero: Whether a line that meets the axis below zero is drawn again through the origin.
+
+        References: Gelman et al., Bayesian Data Analysis, 2013, section 2.6, scaled inverse
+        chi-squared prior.
+        """
+        (n, p), known = columns.shape, np.isfinite(second)
+        line, hat, fitted = relative_line(columns, value)
+        if above_zero and p == 2 and line[0] < 0.0:
+            slope, _, fitted = relative_line(columns[:, 1:], value)
+            line = np.append(0.0, slope)
+        mean = float(second[known].mean()) if known.any() else 0.0
+        off = np.stack([np.log(value / fitted), np.where(known, second - mean, 0.0)], axis=1)
+        freedom = USUAL_FREEDOM + max(n - p, 0)
+        scatter = (USUAL_FREEDOM * np.diag(usual**2) + off.T @ off) / freedom
+        covariance = np.zeros((p + 1, p + 1))
+        covariance[:p, :p] = hat @ hat.T * scatter[0, 0]
+        covariance[:p, p] = covariance[p, :p] = hat.sum(axis=1) / n * scatter[0, 1]
+        covariance[p, p] = scatter[1, 1] / max(int(known.sum()), 1)
+        rng = np.random.default_rng(SEED)
+        z = rng.standard_normal((DRAWS, p + 3))
+        scale = np.sqrt(freedom / rng.chisquare(freedom, DRAWS))[:, None]
+        error = z[:, : p + 1] @ _root(covariance).T * scale
+        return TestLine(line, mean, error, z[:, p + 1 :] @ _root(scatter).T * scale)
 
 
 def _root(covariance: Floats) -> Floats:

@@ -10,10 +10,9 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.config.write_case import case_as_toml, soil_as_toml
-from soilml.identification.bevameter.plate_tests import LEAST_SIZE_RATIO, PressureSinkageFit
+from soilml.identification.bevameter.laws import LEAST_SIZE_RATIO, PressureSinkageFit, ShearFit
 from soilml.identification.bevameter.result import BevameterResult
 from soilml.identification.bevameter.scatter import SpreadEstimate
-from soilml.identification.bevameter.shear_tests import ShearFit
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
@@ -160,7 +159,7 @@ def strength_test(fit: ShearFit) -> ShearStrength | None:
     """The strength under the mean normal stress, where cohesion and friction trade off least."""
     if (scatter := _scatter(fit.strength)) is None:
         return None
-    mean = float(np.mean([test.normal_stress for test in fit.tests]))
+    mean = float(np.mean([test.level for test in fit.tests]))
     stress, strength = map(round_significant, (mean, fit.strength.value))
     return ShearStrength(normal_stress=stress, strength=strength, scatter=scatter)
 

@@ -1,6 +1,5 @@
 """The verdict in words and what it does not support, by status."""
 
-import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -100,7 +99,7 @@ def test_what_is_left_says_beside_which_explanation_and_what_its_cause_is_like()
     suspects = (Suspect(("a", "b"), 0.0, 0.5),)
     parts = {"suspects": suspects, "best_unclaimed": ("a", "b")}
     parts |= {"discrepancy": LEFT | {"drawbar_pull_N": worst}}
-    cause = RemainderCause("shear stress", "slip", ("torque",), 0.95, 2.0)
+    cause = RemainderCause("shear stress", "slip", 0.95, 2.0)
     depends = (
         "The remainder beside {} looks like a change of the shear stress that depends on slip."
     )
@@ -160,41 +159,35 @@ def test_an_implausibly_large_fault_is_named_in_the_headline():
     )
 
 
-def test_suspects_have_their_odds_and_the_first_three_are_listed():
-    odds = {"a": 3.0, "b": 0.0, "c": -1.0, "d": -2.0}
-    suspects = tuple(Suspect((n,), v, 0.9 / (1.0 + math.exp(-v))) for n, v in odds.items())
+def test_suspects_have_their_probabilities_and_the_first_three_are_listed():
+    chances = {"a": 0.86, "b": 0.45, "c": 0.24, "d": 0.1}
+    suspects = tuple(Suspect((n,), 0.0, p) for n, p in chances.items())
     assert said("suspected", suspects=suspects) == (
         "Cause not certain: first suspect is a (probability 0.86); the gap shrinks 8.80 -> 1.10."
     )
     found = lines("suspected", suspects=suspects)
-    assert found["suspects"] == (
-        "Suspects, the likeliest first, within the catalogue: a (odds 20 to 1); b (even odds); "
-        "c (odds 1 to 2.7)."
-    )
+    begin = "Suspects, the likeliest first, with their probabilities:"
+    assert found["suspects"] == f"{begin} a (0.86); b (0.45); c (0.24)."
     assert found["why"].endswith("the evidence is not decisive.")
-    bound = (suspects[0], replace(suspects[1], log_odds=-5.4, probability=0.0049))
-    assert lines("suspected", suspects=bound)["suspects"].endswith("catalogue: a (odds 20 to 1).")
+    bound = (suspects[0], replace(suspects[1], probability=0.0049))
+    assert lines("suspected", suspects=bound)["suspects"] == f"{begin} a (0.86)."
     assert "suspects" not in lines("suspected", suspects=bound[1:])
-
-
-def test_a_likelier_suspect_of_implausible_size_follows_and_the_line_says_why():
-    usual, large = (
-        Suspect(("a",), -2.5, 0.07),
-        Suspect(("b", "c"), -1.3, 0.2, times_usual={"c": 5.93}),
-    )
-    parts = {"suspects": (usual, large), "best_unclaimed": ("a",)}
-    assert said("suspected", **parts).startswith(
-        "Cause not certain: first suspect of usual size is a (probability 0.07); "
-    )
-    assert lines("suspected", **parts)["suspects"] == (
-        "Suspects, the likeliest of usual size first, within the catalogue: a (odds 1 to 12); "
-        "b + c (odds 1 to 3.7). b + c is likelier, but needs c at 5.9 times its usual size."
-    )
-    alone = {"suspects": (large, replace(usual, log_odds=-3.0))}
+    large = (Suspect(("b", "c"), -1.3, 0.2, times_usual={"c": 5.93}),)
     assert "first suspect is b + c (probability 0.20, implausibly large)" in said(
-        "suspected", **alone
+        "suspected", suspects=large
     )
-    assert lines("suspected", **alone)["suspects"].startswith("Suspects, the likeliest first,")
+    assert lines("suspected", suspects=large)["suspects"].endswith(
+        "b + c (0.20). The first needs c at 5.9 times its usual size."
+    )
+
+
+@pytest.mark.parametrize("outside, stated", [(0.049, False), (0.24, True)])
+def test_a_cause_outside_the_catalogue_has_its_probability(outside, stated):
+    sets = {"effects": (effect("dig"),), "cause_set": (("dig",), ("rate",))}
+    suspect = {"suspects": (Suspect(("a",), 0.0, 0.5),)}
+    for status, parts in (("class", sets), ("suspected", suspect), ("unknown", {})):
+        text = lines(status, **parts, outside_probability=outside).get("suspects", "")
+        assert text.endswith("Probability that the catalogue lacks the cause: 0.24.") == stated
 
 
 def test_explanations_by_what_is_claimed():
@@ -211,36 +204,12 @@ def test_explanations_by_what_is_claimed():
         f"Missing effect: one of 2 explanations, likeliest dig {shrinks}"
     )
     assert lines("class", **alone)["suspects"].endswith("first: dig, or plough + rate.")
-    outside = "A cause outside the catalogue is possible."
-    for first, probability, doubted in (
-        ("dig", 0.5, False),
-        ("dig", 0.49, True),
-        ("torque-gain", 0.9, True),
-        ("slope", 0.9, False),
-    ):
-        own = {"effects": (effect(first, probability),), "cause_set": ((first,), ("rate",))}
-        assert lines("class", **own)["suspects"].endswith(outside) == doubted
     many = {"effects": (effect("dig"),), "cause_set": tuple((f"e{i}",) for i in range(13))}
     listed = lines("class", **many)["suspects"]
     assert listed.endswith("e9, or 3 others.") and len(listed.split()) == 29
     assert lines("named", ["dig"], **parts)["tried"] == "The model has dig at another size."
-    weak = alone | {"effects": (effect("dig", 0.08),)}
-    assert said("class", **weak) == (
-        "No effect is likely; the first of 2 explanations is dig (probability 0.08); the gap "
-        "shrinks 8.80 -> 1.10."
-    )
     slight = {"train": GapReduction(8.8, 8.5, {}, 96, "all rows fitted")}
     assert said("named", **parts, gap=slight).endswith("; the gap hardly shrinks 8.80 -> 8.50.")
-
-
-def test_what_is_likelier_than_each_of_a_class_is_named_beside_it():
-    alone = {"effects": (effect("dig"),), "cause_set": (("dig",), ("plough", "rate"))}
-    for name, also in (("drift", ", maybe beside drift (0.93)"), ("rate", "")):
-        suspects = (Suspect((name,), 2.6, 0.93), Suspect(("dig",), 2.3, 0.912))
-        assert said("class", **alone, suspects=suspects) == (
-            f"Missing effect: one of 2 explanations, likeliest dig (probability 0.91){also}; the "
-            "gap shrinks 8.80 -> 1.10."
-        )
 
 
 def concluded(status, obstacles=(), fixed=(), **parts):

@@ -8,9 +8,8 @@ from gap_sets import analysed, case_of, driven, hidden
 
 from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.plans import Plan
-from soilml.gap import gap
+from soilml.gap import STATUSES, gap
 from soilml.gap.results import (
-    STATUSES,
     GapReduction,
     GapReport,
     NamedEffect,
@@ -100,7 +99,7 @@ PARTS = {
         Suspect(("grousers",), 0.0, 0.45),
     ),
     "cause_set": (("a", "b", "c"), ("d",)),
-    "effects": tuple(NamedEffect(n, {}, (), 1.0, "", 0.9, 2.0) for n in ("a", "b", "c")),
+    "effects": tuple(NamedEffect(n, {}, (), 0.9, 2.0) for n in ("a", "b", "c")),
     "notes": (Remark("outliers-matter", "the verdict depends on 3 excluded readings"),),
 }
 

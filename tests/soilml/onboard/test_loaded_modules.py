@@ -18,7 +18,7 @@ def test_the_runtime_loads_numpy_and_onnxruntime_only(small_model, tmp_path):
     )
     loaded, own = (set(line.split()) for line in done.stdout.splitlines())
     assert {"numpy", "onnxruntime"} <= loaded
-    for ground in ("scipy", "sklearn", "torch", "pandas", "pyarrow", "matplotlib", "onnx", "rich"):
+    for ground in ("scipy", "sklearn", "torch", "pandas", "pyarrow", "matplotlib", "onnx"):
         assert ground not in loaded
     for ground in ("datagen", "training", "argparse_completions"):
         assert ground not in loaded

@@ -101,7 +101,8 @@ def test_the_command_takes_a_narrower_prior_of_the_case(tmp_path, model_file, ca
     (tmp_path / "runs.csv").write_text("\n".join(lines) + "\n")
     std = {}
     for case in ("model.toml", "narrow.toml"):
-        assert main(["estimate", "wheel", "runs.csv", "--model", case, "--by", "run"]) == 0
+        command = ["estimate", "wheel", "runs.csv", "--model", case, "--by", "run"]
+        assert main([*command, "--format", "csv"]) == 0
         captured = capsys.readouterr()
         head, line = captured.out.strip().splitlines()[:2]
         std[case] = float(

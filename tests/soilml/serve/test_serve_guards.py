@@ -100,7 +100,7 @@ def test_a_file_that_is_too_large_is_refused_before_it_is_sent(page):
         Content_Length=size,
     )
     assert answer[0] == 413
-    assert "log.csv has 256 MB; at most 256 MB are taken here" in error_of(answer)
+    assert "log.csv has 256 MB; at most 256 MB are accepted" in error_of(answer)
 
 
 def test_a_number_without_end_is_refused(page):

@@ -27,13 +27,11 @@ def written(page, job, name, **headers):
     return found, text
 
 
-@pytest.mark.parametrize(
-    ("kind", "words"), [("identify", "identify"), ("pull", "pull"), ("gap", "gap")]
-)
-def test_an_answer_is_the_report_of_the_command(page, runs, kind, words):
+@pytest.mark.parametrize("kind", ["identify", "pull", "gap"])
+def test_an_answer_is_the_report_of_the_command(page, runs, kind):
     job = page.job(kind=kind, files=[runs], model=MODEL)
     assert job["state"] == "done", job["error"]
-    assert job["result"]["command"].startswith(f"soilml {words} MODEL.toml RUNS.csv ")
+    assert job["result"]["command"].startswith(f"soilml {kind} MODEL.toml RUNS.csv ")
     headers, text = written(page, job, "report.html?show=1")
     assert b"<h1" in text and "sandbox" in headers["Content-Security-Policy"]
     assert "script" not in headers["Content-Security-Policy"]
@@ -92,11 +90,20 @@ def test_a_raw_log_is_guessed_corrected_and_imported(page, tmp_path):
     assert again["kind"] == "runs" and again["rows"] == 4
 
 
-def test_wheels_are_compared_and_a_wrong_question_is_one_line(page):
-    question = json.loads(page.request("GET", "/api/choices")[2])["question"]
+@pytest.fixture
+def question(page):
+    """The first question of the page about wheels."""
+    return json.loads(page.request("GET", "/api/choices")[2])["question"]
+
+
+@pytest.mark.parametrize("change", [("mass = 12.0", "mass = -1"), ("[rover]", "[rover")])
+def test_a_wrong_question_about_wheels_is_one_line(page, question, change):
+    job = page.job(kind="wheels", files=[], question=question.replace(*change))
+    assert job["state"] == "failed" and "rover.toml" in job["error"]
+
+
+@pytest.mark.long
+def test_wheels_are_compared(page, question):
     job = page.job(kind="wheels", files=[], question=question, effort="quick")
     assert job["state"] == "done", job["error"]
     assert {"report.html", "report.json"} <= set(job["result"]["files"])
-    for change in (("mass = 12.0", "mass = -1"), ("[rover]", "[rover")):
-        job = page.job(kind="wheels", files=[], question=question.replace(*change))
-        assert job["state"] == "failed" and "rover.toml" in job["error"]

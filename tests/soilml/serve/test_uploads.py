@@ -1,14 +1,15 @@
 """The store of dropped files: what it holds, and what it has promised to hold."""
 
+import asyncio
 import socket
 import time
 from contextlib import ExitStack
 
-import pytest
 from served_page import page as page
+from tornado.httpserver import HTTPServer
 
-from soilml.errors import InputError
-from soilml.serve.uploads import LARGEST_FILE, LARGEST_SUM, STALLED_AFTER, Uploads
+from soilml.serve.application import application
+from soilml.serve.uploads import LARGEST_FILE, LARGEST_SUM
 
 COUNT = LARGEST_SUM // LARGEST_FILE
 
@@ -39,16 +40,22 @@ def test_the_page_takes_no_more_at_a_time_than_in_all(page):
         time.sleep(0.05)
 
 
-def test_uploads_that_have_stalled_make_room(tmp_path):
-    now = [0.0]
-    uploads = Uploads(tmp_path, clock=lambda: now[0])
-    stalled, alive, *_ = [uploads.place("a.csv", LARGEST_FILE) for _ in range(COUNT)]
-    now[0] = STALLED_AFTER + 1.0
-    assert uploads.has_come_on(alive)
-    kept = uploads.place("b.csv", LARGEST_FILE)
-    assert not stalled.path.parent.exists() and not uploads.has_come_on(stalled)
-    assert uploads.has_come_on(alive) and uploads.has_come_on(kept)
-    uploads.place("c.csv", LARGEST_FILE)
-    uploads.place("d.csv", LARGEST_FILE)
-    with pytest.raises(InputError, match="1024 MB together"):
-        uploads.place("e.csv", LARGEST_FILE)  # none of these has stalled
+def test_an_upload_that_stalls_is_closed_and_makes_room(tmp_path):
+    async def stalled():
+        opened = socket.create_server(("127.0.0.1", 0))
+        opened.setblocking(False)
+        port = opened.getsockname()[1]
+        server = HTTPServer(application(tmp_path, port)[0], body_timeout=0.2)
+        server.add_socket(opened)
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        writer.write(
+            f"PUT /api/files?name=a.csv HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
+            "Content-Type: application/octet-stream\r\nContent-Length: 9\r\n\r\nrun".encode()
+        )
+        assert await asyncio.wait_for(reader.read(), 20) == b""  # closed without an answer
+        writer.close()
+        server.stop()
+        await server.close_all_connections()
+
+    asyncio.run(stalled())
+    assert list((tmp_path / "files").iterdir()) == []
