@@ -44,7 +44,7 @@ SPEEDS = (
     ("commands", f"{_SET} `wheel", 1, "16 readings, `wheel`, onnxruntime", "none"),
     ("commands", f"{_SET} `any_wheel", 1, "16, `any_wheel`, onnxruntime", "none"),
     ("c", "wheel set of 16, with errors", 4, "16, `wheel`, in C, us", "half of onnxruntime"),
-    ("c-memory", "wheel_small", 3, "working memory of `wheel_small` in C, kB", "24"),
+    ("c-memory", "wheel_small", 4, "working memory of `wheel_small` in C, kB", "24"),
 )
 
 

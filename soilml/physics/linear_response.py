@@ -71,7 +71,11 @@ def linear_response(
             [xp.take(solved.sinkage, position, axis=0), solved.sinkage * math.exp(SINKAGE_STEP)],
             axis=0,
         )
-        at_sinkage = in_chunks(rows(load_case, evaluated), _at_sinkage, sinkage)
+        at_sinkage = in_chunks(
+            rows(load_case, evaluated),
+            lambda part, z: forces_at_sinkage(apply_input_effects(part), z),
+            sinkage,
+        )
         true_case = apply_input_effects(load_case)
         return _first_order(true_case, base, base_rows, position, at_sinkage, solved.status)
 
@@ -104,7 +108,3 @@ def _first_order(
     slope = rising / here["load"][base_rows]
     sinkage = SinkageEstimate(xp.log(here["sinkage"]) + step, slope[position])
     return LinearResponse(without_unsolved(reading), sinkage)
-
-
-def _at_sinkage(load_case: LoadCase, sinkage: Array) -> Force:
-    return forces_at_sinkage(apply_input_effects(load_case), sinkage)

@@ -145,7 +145,8 @@ def _inputs(worlds: DrawnWorlds, outcome: Outcomes) -> dict[str, Floats]:
     """
     inputs: dict[str, Floats] = {}
     if len(worlds.kinds) > 1:
-        inputs["soil"] = _indicators(worlds.kind)
+        kinds = np.unique(worlds.kind)[1:]  # a column for each kind but the first
+        inputs["soil"] = np.stack([worlds.kind == k for k in kinds], axis=1).astype(np.float64)
     soil = {n: v - _mean_of_kind(v, worlds.kind) for n, v in worlds.soil.items()}
     numbers: dict[str, Floats] = {**soil, **worlds.errors}
     numbers["lug_shearing"] = worlds.lug_shearing
@@ -165,11 +166,6 @@ def _inputs(worlds: DrawnWorlds, outcome: Outcomes) -> dict[str, Floats]:
 def _mean_of_kind(values: Floats, kind: Integers) -> Floats:
     sums, counts = np.bincount(kind, values), np.bincount(kind)
     return np.asarray((sums / np.maximum(counts, 1))[kind])
-
-
-def _indicators(kind: Integers) -> Floats:
-    """A column for each kind but the first."""
-    return np.stack([kind == k for k in np.unique(kind)[1:]], axis=1).astype(np.float64)
 
 
 def _finite(margin: Floats) -> Floats:

@@ -195,33 +195,6 @@ def _check_gazebo(values: Values) -> None:
         )
 
 
-def _isaac_files(values: Values) -> dict[str, str]:
-    text = f"""#usda 1.0
-(
-    defaultPrim = "Soil"
-    doc = "Friction of a soil by soilml"
-)
-
-def Material "Soil" (
-    prepend apiSchemas = ["PhysicsMaterialAPI", "PhysxMaterialAPI"]
-)
-{{
-    float physics:staticFriction = {values["staticFriction"]:.9g}
-    float physics:dynamicFriction = {values["dynamicFriction"]:.9g}
-    float physics:restitution = {values["restitution"]:.9g}
-    uniform token physxMaterial:frictionCombineMode = "multiply"
-}}
-"""
-    return {"soil_material{}.usda": text}
-
-
-def _csv_files(values: Values) -> dict[str, str]:
-    units = [declared(Soil)[name].unit for name in values]
-    numbers = list(values.values())
-    text = csv_text({"parameter": list(values), "value": numbers, "unit": units})
-    return {"soil{}.csv": text}
-
-
 _CHRONO_SCM = SoilTarget(
     name="chrono",
     program="Project Chrono, deformable terrain SCM (`SCMTerrain::SetSoilParameters`)",

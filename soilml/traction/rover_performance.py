@@ -183,6 +183,7 @@ def rover_performance(
     names = list(rover.wheels)
     loads = rover.loads(slopes)
     level = wheel_curves(case, draws, np.zeros(1), slip, speed)
+    ratio = np.nan_to_num(level.total_pull / level.energy(slip), nan=-np.inf)
     return RoverPerformance(
         slope=slopes,
         slip=joined["slip"],
@@ -193,7 +194,7 @@ def rover_performance(
         sinkage=dict(zip(names, joined["sinkage"], strict=True)),
         passes=wheel_passes(case),
         steepest_slope=_steepest(case, draws, slip, speed, level),
-        best_slip=_best_slip(level, slip),
+        best_slip=np.where(ratio.max(axis=1) > 0.0, slip[np.argmax(ratio, axis=1)], np.nan),
         slip_limit=float(slip[-1]),
     )
 
@@ -238,12 +239,6 @@ def _at_needed_slip(curves: WheelCurves, slip: Floats, needed: float) -> dict[st
         "torque": at.of_curve(curves.torque),
         "sinkage": at.of_curve(curves.sinkage),
     }
-
-
-def _best_slip(curves: WheelCurves, slip: Floats) -> Floats:
-    """Slip of the largest ratio of pull to work for each metre, (n,)."""
-    ratio = np.nan_to_num(curves.total_pull / curves.energy(slip), nan=-np.inf)
-    return np.where(ratio.max(axis=1) > 0.0, slip[np.argmax(ratio, axis=1)], np.nan)
 
 
 def _steepest(

@@ -33,6 +33,7 @@ from training.export_c.translation import flat_nodes, translate, with_templates
 BYTES = {"double": 8, "float": 4, "int": 4, "bool": 1}
 #: Rows that one call takes, unless the user wants another number.
 ROWS_PER_CALL = 32
+CRC_BYTES = 4096  # Of the tables of a checksum, which files for a microcontroller do without
 TEMPLATES = Path(__file__).parent / "templates"
 KERNELS = TEMPLATES / "kernels"
 #: Functions of the C library in the kernels, by element type.
@@ -99,7 +100,7 @@ def write_c(
     single = single_function(model, shared) if interface.single else None
     sets = set_functions(model, interface, shared, rows) if interface.sets else None
     functions = [single] if single else []
-    functions += [sets.row, sets.set, sets.soil, sets.answer] if sets else []
+    functions += [sets.row, sets.set, sets.once, sets.soil, sets.answer] if sets else []
     arrays = {
         name: (kind, max(f.lengths.get(kind, 0) for f in functions))
         for kind, name in ARRAYS.items()
@@ -121,7 +122,9 @@ def write_c(
     sizes = {
         "memory_bytes": -(-memory // 8) * 8 if interface.sets else 0,
         "work_bytes": -(-work // 8) * 8,
-        "constant_bytes": sum(v.size * BYTES[kind] for _, v, kind in constants) + 4 * of_sampler,
+        "constant_bytes": sum(v.size * BYTES[kind] for _, v, kind in constants)
+        + 4 * of_sampler
+        + (CRC_BYTES if interface.sets and not interface.small else 0),
     }
     environment = template_environment()
     environment.filters["scalar"] = lambda output: output.removeprefix(SET_PREFIX) in SCALARS
@@ -175,12 +178,26 @@ def template_environment() -> Any:
         keep_trailing_newline=True,
         autoescape=False,
     )
+    environment.globals["crc_tables"] = [[f"{x:#x}u" for x in own] for own in _crc_tables()]
     environment.filters["float"] = lambda x: number(x, "float")
     environment.filters["elements"] = prod
     environment.filters["wrapped"] = lambda text, indent: "\n".join(wrapped(text, indent))
     environment.filters["constant_array"] = _constant_array
     environment.filters["floats"] = lambda many: ", ".join(number(x, "float") for x in many)
     return environment
+
+
+def _crc_tables() -> list[list[int]]:
+    """Four tables (256,) of CRC-32: of a byte, and of one with up to three zeros behind it."""
+    first = []
+    for crc in range(256):
+        for _ in range(8):
+            crc = crc >> 1 ^ (0xEDB88320 if crc & 1 else 0)
+        first.append(crc)
+    tables = [first]
+    while len(tables) < CRC_BYTES // 1024:
+        tables.append([x >> 8 ^ first[x & 255] for x in tables[-1]])
+    return tables
 
 
 def single_function(model: Any, shared: SharedParts) -> Function:

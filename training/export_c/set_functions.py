@@ -55,11 +55,15 @@ class SetFunctions:
 
     row: Function  # columns in the middle of the prior, and what `soil` needs of a row
     set: Function  # inputs of the composites that belong to a set
+    once: Function  # values of a soil that are the same for all rows
     soil: Function  # columns of a row at a soil
     answer: Function  # outputs of a set
     #: what `soil` needs of a row: number of floats, and where each value begins among them
     kept: int
     places: dict[str, int]
+    #: the same of `once`
+    of_soil: int
+    soil_places: dict[str, int]
     #: C names of the outputs of `row` and `set` by what they are
     names: dict[str, str]
     given: dict[str, str]  # C expressions of values that composites make
@@ -116,10 +120,23 @@ def set_functions(model: Any, interface: Interface, shared: SharedParts, rows: i
     if row.outputs[first["columns"]][1][0] != CHANNELS:
         raise ModelFileError(EARLIER)
     kept = {name: Tensor(f"in_{name}", *row.outputs[name]) for name in sorted(live)}
-    if wrong := [name for name, tensor in kept.items() if tensor.kind != "float"]:
+    shared_values = {
+        name
+        for node in others
+        if soil_values & row_values & set(node.output)
+        for name in node.input
+        if name in soil_values and name not in row_values and name != basis
+    }
+    once = translate(
+        "once_graph", nodes, known, {basis: soil, **of_set}, sorted(shared_values), shared
+    )
+    for_rows = {name: Tensor(f"in_{name}", *once.outputs[name]) for name in sorted(shared_values)}
+    starts, begins = (
+        np.cumsum([0, *(tensor.count for tensor in own.values())]) for own in (kept, for_rows)
+    )
+    if wrong := [n for n, tensor in (kept | for_rows).items() if tensor.kind != "float"]:
         raise ModelFileError(f"value {wrong[0]} of a row is not float32")
-    starts = np.cumsum([0, *(tensor.count for tensor in kept.values())])
-    inputs = {basis: soil, **kept, **of_set}
+    inputs = {basis: soil, **kept, **for_rows, **of_set}
     at_soil = translate("soil_graph", nodes, known, inputs, [posterior["columns"]], shared)
     total = {counted: Tensor("in_counted", "float", (3,))}
     of_composites = {"limit": posterior["limit"], "size": posterior["size"]}
@@ -148,8 +165,9 @@ def set_functions(model: Any, interface: Interface, shared: SharedParts, rows: i
     of_c = {basis: "work->soil", counted: "work->counted"}
     of_c |= {n: f"work->{t.name.removeprefix('in_')}" for n, t in sample.items()}
     return SetFunctions(
-        row, whole, at_soil, answer, int(starts[-1]),
-        dict(zip(kept, starts.tolist(), strict=False)), names | of_composites, of_c, sizes,
+        row, whole, once, at_soil, answer, int(starts[-1]),
+        dict(zip(kept, starts.tolist(), strict=False)), int(begins[-1]),
+        dict(zip(for_rows, begins.tolist(), strict=False)), names | of_composites, of_c, sizes,
     )  # fmt: skip
 
 
@@ -252,7 +270,8 @@ def work_fields(functions: SetFunctions, columns: int, rows: int) -> dict[str, i
         "whitening": v["SCALES"] * v["ERRORS"] ** 2,
         "mean": v["ERRORS"] * max(v["WIDTH"], 2 * v["ERRORS"] + 7),
         "unbounded": max(v["UNKNOWNS"] - 1, 1) * v["ADAPTED"],
-        "kept": rows * functions.kept, "fresh": CHANNELS * rows * columns,
+        "kept": rows * functions.kept, "of_soil": max(functions.of_soil, 1),
+        "fresh": CHANNELS * rows * columns,
     }  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from soilml import __version__
 from soilml.onboard.slip_stream import FLAGS, POSSIBLE, QUANTILES, RECENT
 from soilml.slip_filter.filter import SlipFilter
-from training.export_c.c_file import BYTES, kernel_texts, template_environment
+from training.export_c.c_file import BYTES, CRC_BYTES, kernel_texts, template_environment
 from training.export_c.c_text import array
 from training.export_c.interface import input_shapes
 from training.export_c.program import ARRAYS, SharedParts
@@ -57,7 +57,9 @@ def write_slip_c(
     sizes = {
         "work_bytes": sum(BYTES[kind] * length for kind, length in arrays.values()),
         "state_bytes": 4 * (start.size + RECENT + 2),
-        "constant_bytes": sum(v.size * BYTES[kind] for _, v, kind in used) + 4 * start.shape[0],
+        "constant_bytes": sum(v.size * BYTES[kind] for _, v, kind in used)
+        + 4 * start.shape[0]
+        + CRC_BYTES,
     }
     values = {
         "name": name,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
 from soilml.physics.contact import SMALLEST_DEPTH, Contact, Resolution
-from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc, displacement_direction
+from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc, contact_at
 from soilml.physics.operating_point import Operating
 
 
@@ -56,20 +56,13 @@ class LinearWheel(RigidWheel):
         angle = xp.stack([leave, peak], axis=0)
         passed = entry - angle
         peak_depth = geometry.radius * (cos(peak) - cos(entry))
-        travelled = geometry.travelled(at.slip, self.braking)
-        displacement = geometry.shear_radius * (passed - travelled * (sin(entry) - sin(angle)))
-        return Contact(
-            depth=xp.stack([xp.full_like(peak, SMALLEST_DEPTH), peak_depth], axis=0),
-            shear_displacement=displacement,
-            surface_travel=geometry.shear_radius * passed,
+        depth = xp.stack([xp.full_like(peak, SMALLEST_DEPTH), peak_depth], axis=0)
+        found = contact_at(geometry, at, passed, depth, 0.0 * passed, self.braking)
+        return replace(
+            found,
             area=scale * 0.5 * xp.stack([rear, front + rear], axis=0),
             horizontal_area=scale * xp.stack([cos_exit, cos_rear + cos_front], axis=0),
             frontal_area=scale * xp.stack([sin_exit, sin_rear + sin_front], axis=0),
-            shear_lever_arm=geometry.lever,
-            width=geometry.width,
-            shear_direction=displacement_direction(displacement, at.slip, self.braking),
-            travel_ratio=travelled,
-            geometry=geometry,
         )
 
     def profile_contact(
