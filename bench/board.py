@@ -19,8 +19,9 @@ OUTPUTS = ("mean", "std", "covariance", "in_range")
 READING = {"slip": 0.3, "torque": 3.0, "load": 60.0}
 ABOUT = (
     "Median and 99th percentile (p99) in microseconds, one thread. Goals: 60 us for one reading, "
-    "150 us for a set of 16 (`any_wheel.onnx`: 350 us), 0.5 MB per "
-    "file. *Parity*: largest difference between the float32 file and the float64 estimator, over "
+    "0.5 MB per file; none for sets, whose time is that of the graph's nodes "
+    "([decision 37](../../docs/decisions/0037-shortcuts-in-the-graph.md)). *Parity*: largest "
+    "difference between the float32 file and the float64 estimator, over "
     "the standard deviation of the prior; goal: 1e-4."
 )
 

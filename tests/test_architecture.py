@@ -27,7 +27,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/numerics/gaussian_emulator.py": {"scipy"},
     "soilml/gap/workflow.py": {"threadpoolctl"},
     "soilml/inference/posterior.py": {"threadpoolctl"},
-    "soilml/log_import/windows/stances.py": {"scipy"},
+    "soilml/log_import/stance_rows.py": {"scipy"},
     "soilml/systems/rim_stress/stress.py": {"scipy"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/presentation.py": {"matplotlib"},

@@ -18,12 +18,15 @@ from training.calibration.training_domain import TrainingDomain
 from training.cross_fit import LeftOut, cross_fit
 from training.dataset import Dataset
 from training.set_posterior.families.recipe_family import RecipeFamily
+from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.response_surface import fit_response
+from training.set_posterior.response_surface import ResponseSettings, fit_response
+from training.set_posterior.row_inputs import FileNoise
 from training.set_posterior.validation import (
+    NO_LIMITS,
     SetFigures,
-    calibrate_misfit_limits,
     validate_posterior,
+    with_misfit_limits,
 )
 from training.spec import AnyWheelSpec, Spec
 
@@ -108,7 +111,12 @@ def train(
         data.targets.mean(axis=0), data.targets.std(axis=0), data.lower, data.upper
     )
     # first, because it refuses loads that the soils do not carry
-    set_posterior, set_figures = _train_set_posterior(spec, data, progress)
+    set_posterior: SetPosteriorGraph | None = None
+    set_figures: dict[int, SetFigures] = {}
+    if spec.set_posterior is not None:
+        family = RecipeFamily.of(parse_recipe(data.recipe, "recipe of the data"), spec.targets)
+        noise = family.declared_noise()
+        set_posterior, set_figures = _train_sets(family, spec.set_posterior, noise, progress)
     found = cross_fit(spec, data, prior, progress)
     left, errors = found.left_out, None
     if spec.per_row:
@@ -133,26 +141,16 @@ def train(
 
 def train_any_wheel(spec: AnyWheelSpec, progress: Progress) -> TrainedSetPosterior:
     """The set posterior of wheels of any size, and its metrics on fresh simulated sets."""
-    response = fit_response(spec.family, spec.response, progress)
-    posterior = calibrate_misfit_limits(spec.family, response, progress, spec.response.small)
-    posterior = replace(
-        posterior, scales=spec.response.scales, sensor_errors=spec.response.sensor_errors
-    )
-    return posterior, validate_posterior(posterior, progress)
+    return _train_sets(spec.family, spec.response, spec.noise, progress)
 
 
-def _train_set_posterior(
-    spec: Spec, data: Dataset, progress: Progress
-) -> tuple[SetPosteriorGraph | None, dict[int, SetFigures]]:
-    if spec.set_posterior is None:
-        return None, {}
-    family = RecipeFamily.of(parse_recipe(data.recipe, "recipe of the data"), spec.targets)
-    response = fit_response(family, spec.set_posterior, progress)
-    posterior = calibrate_misfit_limits(family, response, progress, spec.set_posterior.small)
-    posterior = replace(
-        posterior,
-        noise=family.declared_noise(),
-        scales=spec.set_posterior.scales,
-        sensor_errors=spec.set_posterior.sensor_errors,
-    )
+def _train_sets(
+    family: WheelFamily, settings: ResponseSettings, noise: FileNoise, progress: Progress
+) -> TrainedSetPosterior:
+    """The set posterior of a family, and its metrics; `noise` is the file's own."""
+    posterior = SetPosteriorGraph(
+        family, fit_response(family, settings, progress), NO_LIMITS, noise, settings.small,
+        settings.scales, settings.sensor_errors,
+    )  # fmt: skip
+    posterior = with_misfit_limits(posterior, progress)
     return posterior, validate_posterior(posterior, progress)

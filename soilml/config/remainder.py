@@ -7,17 +7,16 @@ channel and gear, given the readings of the analysis.
 from __future__ import annotations
 
 import hashlib
-import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.io.declared_settings import Default, Numbers, OneOf, take_declared
+from soilml.io.declared_settings import Default, Numbers, OneOf, settings_of, take_declared
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
 from soilml.numerics.smooth_process import SmoothFunctions, process_columns, squared_exponential
@@ -234,6 +233,11 @@ class Remainder:
         """Columns that have a remainder, each once."""
         return list(dict.fromkeys(part.column for part in self.parts))
 
+    def as_settings(self) -> dict[str, Any]:
+        """The table [remainder]; `take_remainder` reads the same back."""
+        rows = {"rows": list(self.rows)} if self.rows else {}
+        return {"format": FORMAT, **rows, "part": [settings_of(part) for part in self.parts]}
+
     def mean_and_std(
         self, channel: str, slip: Any, load: Any, gear: str = ""
     ) -> tuple[Floats, Floats]:
@@ -329,32 +333,12 @@ def _take_part(settings: Settings, gears: Sequence[str]) -> RemainderPart:
     return part
 
 
-def remainder_lines(remainder: Remainder) -> list[str]:
-    """The table [remainder] as lines of TOML; `take_remainder` reads the same back."""
-    lines = ["[remainder]", f"format = {FORMAT}"]
-    lines += [f"rows = {_written(remainder.rows)}"] if remainder.rows else []
-    for part in remainder.parts:
-        lines += ["", "[[remainder.part]]"]
-        values: Mapping[str, Any] = {f.name: getattr(part, f.name) for f in fields(part)}
-        lines += [f"{k} = {_written(v)}" for k, v in values.items() if k != "gear" or v]
-    return lines
-
-
 def _marks(table: Table) -> set[str]:
     """Digests of the rows of a table, by slip, load and the readings of the channels."""
     names = [n for n in ("slip", "load_N", *map(column, CHANNELS)) if n in table]
     rows = zip(*(table[name] for name in names), strict=True)
     texts = (",".join(f"{v:.6g}" for v in row if math.isfinite(v)) for row in rows)
     return {hashlib.sha256(text.encode()).hexdigest()[:MARK_DIGITS] for text in texts}
-
-
-def _written(value: Any) -> str:
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, tuple):
-        inner = ", ".join(_written(v) for v in value)
-        return f"[{inner}]"
-    return repr(float(value))
 
 
 def _smooth_columns(points: Floats, std: Floats) -> Floats:

@@ -15,6 +15,7 @@ from soilml.io.declared_settings import Numbers
 from soilml.io.read_table import read_table
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
+from soilml.io.toml_text import Inline
 from soilml.numerics.gaussian_emulator import GaussianEmulator, fit_emulator
 from soilml.numerics.prior import Prior
 from soilml.optional_imports import need
@@ -56,22 +57,15 @@ class Simulator:
         """What makes runs, as the model file has it; "" where nothing does."""
         return self.command or (f"{self.python}:{self.function}" if self.python else "")
 
-    def lines(self) -> list[str]:
-        """The table as lines of TOML, with the full paths of its files."""
+    def as_settings(self) -> dict[str, object]:
+        """The table [simulator], with the full paths of its files."""
         python = f"{self.python.resolve()}:{self.function}" if self.python else ""
-        own = {"python": python, "command": self.command}
+        own: dict[str, object] = {"runs": Inline(self.columns())}
         if self.runs is not None:
-            runs = f"table = '{self.runs.resolve()}'"
-        else:
-            columns = (f"{key} = {values}" for key, values in self.columns().items())
-            runs = f"runs = {{ {', '.join(columns)} }}"
-        return [
-            "[simulator]",
-            runs,
-            *(f"{key} = '''{text}'''" for key, text in own.items() if text),
-            f"slip = [{self.slip[0]!r}, {self.slip[1]!r}]",
-            f"load_N = [{self.load[0]!r}, {self.load[1]!r}]",
-        ]
+            own = {"table": str(self.runs.resolve())}
+        made = {"python": python, "command": self.command}
+        own |= {key: text for key, text in made.items() if text}
+        return own | {"slip": list(self.slip), "load_N": list(self.load)}
 
     def columns(self) -> dict[str, list[float]]:
         """The runs that were read, as lists of numbers by column."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
-from soilml.io.declared_settings import Key, Numbers, keys_of, take_declared
+from soilml.io.declared_settings import Key, Numbers, take_declared
 from soilml.io.toml_settings import Settings
 from soilml.parameters import Parameter, check_number
 from soilml.physics.gears.rigid_wheel import RigidWheel
@@ -240,7 +240,3 @@ class DriveErrors:
     speed_std: Annotated[
         float, Key("rim_speed_std"), Parameter("1", 0.0, 0.2, "share of the rim speed of a row")
     ] = 0.005
-
-
-#: Key of each field of `DriveErrors` in the file.
-DRIVE_KEYS = keys_of(DriveErrors)

@@ -187,7 +187,7 @@ def _sizes(found: GapReport) -> ReportTable:
     columns.append(Column("readings", [part.readings for part in parts]))
     columns.append(Column("what", [part.description for part in parts]))
     note = "Mean squared residual in sigma; noise alone gives 1. Blank: not smaller after."
-    return ReportTable("Size of the gap", columns, note)
+    return ReportTable("Figures of the gap", columns, note)
 
 
 def _discrepancy(found: GapReport) -> ReportTable:

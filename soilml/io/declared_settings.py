@@ -181,9 +181,10 @@ def _declarations(cls: Any) -> list[tuple[str, str, Any, tuple[Any, ...], bool]]
     return found
 
 
-def keys_of(cls: type) -> dict[str, str]:
-    """The key of each field of a dataclass."""
-    return {name: key for name, key, *_ in _declarations(cls)}
+def settings_of(given: Any) -> dict[str, Any]:
+    """The table that `take_declared` reads as this dataclass; None and "" are not written."""
+    values = {key: getattr(given, name) for name, key, *_ in _declarations(type(given))}
+    return {key: value for key, value in values.items() if value is not None and value != ""}
 
 
 def take_declared(cls: type[T], settings: Settings, kind: str = "", **given: Any) -> T:

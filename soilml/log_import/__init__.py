@@ -10,7 +10,7 @@ from typing import Any
 
 _HOME = {
     "import_log": "soilml.log_import.workflow",
-    "init_map": "soilml.log_import.new_map",
+    "init_map": "soilml.log_import.guesses.map_guess",
     "ImportedLog": "soilml.log_import.result",
     "LogMap": "soilml.log_import.mapping.log_map",
     "read_map": "soilml.log_import.mapping.log_map",

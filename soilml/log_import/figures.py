@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
+from soilml.fitting.levels import load_levels
 from soilml.io.table import Table
 from soilml.log_import.rows import WheelSeries
 from soilml.quantities import Z_90
@@ -70,7 +71,7 @@ def panels_over_slip(table: Table, radius: float) -> list[PanelOverSlip]:
 def draw_over_slip(axes: Axes, table: Table, panel: PanelOverSlip) -> None:
     """Draw a column over slip with 90 % intervals, in a colour for each load."""
     key, unit, loads = panel.key, panel.unit, table["load_N"]
-    groups = _load_groups(loads)
+    groups = load_levels(loads).index
     std, slip_std = _std(table, key), _std(table, "slip")
     for k in range(int(groups.max()) + 1):
         rows = groups == k
@@ -84,17 +85,6 @@ def draw_over_slip(axes: Axes, table: Table, panel: PanelOverSlip) -> None:
     axes.set_xlabel("slip")
     axes.set_title(panel.title)
     axes.legend(title="load", title_fontsize=9)
-
-
-def _load_groups(loads: Floats) -> NDArray[np.int64]:
-    """Group (rows,) of each load: gaps of more than 10 % divide them, into at most five."""
-    order = np.argsort(loads)
-    gaps = np.diff(np.log(loads[order]))
-    edges = np.sort(np.argsort(-gaps)[: len(LOADS) - 1])
-    edges = edges[gaps[edges] > 0.1]
-    groups = np.zeros(loads.size, dtype=np.int64)
-    groups[order] = np.searchsorted(edges, np.arange(loads.size), side="left")
-    return groups
 
 
 def _std(table: Table, key: str) -> Floats:

@@ -15,7 +15,7 @@ from soilml.io.table import TEXT, Table
 from soilml.log_import.channels.inputs import Inputs, channel_constant, combined, our_slip
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.channels.wheel_quantities import Conversion, gear_of
-from soilml.log_import.mapping.channel_map import ChannelMap
+from soilml.log_import.mapping.channel_map import ROTATIONS, TRAVELS, ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.windows.mean_errors import mean_error, pooled_errors, travel_ratio
 from soilml.log_import.windows.steady import Stretch
@@ -112,8 +112,8 @@ def _exact_speeds(
     None where slip does not follow from two measured speeds.
     """
     channels, constants = conversion.wheel.channels, conversion.values
-    rim_role = next((r for r in ("rim_speed", "wheel_angle", "wheel_speed") if r in channels), None)
-    ground_role = next((r for r in ("position", "ground_speed") if r in channels), None)
+    rim_role = next((r for r in ROTATIONS if r in channels), None)
+    ground_role = next((r for r in TRAVELS if r in channels), None)
     if rim_role is None or ground_role is None or "slip" in channels:
         return None
     scale, rim_key = 1.0, "rim_speed"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from unicodedata import combining, normalize
 
@@ -18,58 +19,34 @@ from soilml.log_import.guesses.constants import agreed_constants, stated_radius
 from soilml.log_import.readers import read_log
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import dimension, factor, unit_in_name
+from soilml.optional_imports import tomllib
 from soilml.quantities import COLUMNS
 
-#: Words of the columns of tables of tests, without accents: beginnings of words from so many
-#: letters on, whole words below.
-_STEM = 4
-_SHEAR = ("tau", "shear", "scher", "schub", "tagli", "cort", "cisaill")
-_RING = ("angle", "angul", "angol", "winkel", "theta", "rotation")
-_VERTICAL = ("vert", "axia", "settl", "dilat", "setzung", "dv", "v")
-_WAYS = ("disp", "verschiebung", "weg", "travel", "desplaz", "deplac", "spost")
-_DIAMETER = ("d", "dia", "diam", "durchmesser")
-_VANE = ("vane", "flugel", "fluegel")
-_PORE = ("pore", "porewater", "poren", "u")
-_CONFINING = ("confin", "cell", "zell", "seitendruck", "lateral", "radial")
-_DEVIATOR = ("deviator",)
-#: Our column, its unit, and the words of which a name must have one; the first that fits counts.
-_QUANTITIES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-    ("shear_stress_Pa", "Pa", (*_SHEAR, "t", "strength")),
-    ("normal_stress_Pa", "Pa", ("sigma", "normal", "sn", "s", *_VERTICAL)),
-    ("pressure_Pa", "Pa", ("p", "pres", "druck", "contact", "stress", "q")),
-    ("shear_displacement_m", "m", (*_SHEAR, "j", "x", "horiz", "orizz", "dh", "u")),
-    ("inner_radius_m", "m", ("inner", "innen", "ri", "id")),
-    ("outer_radius_m", "m", ("outer", "aussen", "ro", "ra", "od")),
-    ("plate_diameter", "m", _DIAMETER),
-    ("plate_width_m", "m", ("width", "breite", "largeur", "ancho", "larghezza", "w")),
-    ("plate_length_m", "m", ("length", "lange", "laenge", "longueur", "largo", "lunghezza", "l")),
-    ("plate_radius_m", "m", ("r", "radi", "rayon", "raggio", "b")),
-    ("sinkage_m", "m", ("z", "sink", "depth", "penetra", "einsink", "tief", "enfonc", "hundi",
-                        "affond", "h")),
-    ("displacement", "m", (*_WAYS, *_VERTICAL)),
-    ("plate_area_m2", "m^2", ("area", "aire", "flach", "flaech", "superfic", "a")),
-    ("shear_force", "N", _SHEAR),
-    ("load_N", "N", ("load", "force", "f", "w", "fz", "kraft", "last", "n", "charge", "carg",
-                     "carico", "fuerza", "forza")),
-    ("torque_Nm", "N m", ("torque", "moment", "t", "m", "drehmoment", "couple", "coppia", "par")),
-    ("angle_rad", "rad", _RING),
-)  # fmt: skip
+_STEM = 4  # Fewest letters of a word that others may begin with
 #: Columns by which a table is one of tests, and not of the runs of a wheel.
 _OF_TESTS = (
     {"shear_stress_Pa"}, {"torque_Nm", "angle_rad"}, {"torque_Nm", "outer_radius_m"},
     {"pressure_Pa"},
 )  # fmt: skip
-#: Words of stresses and torques beside those of the strength.
-_SECOND = ("pre", "preshear", "consol", "resid", "rest", "ultim", "end")
 #: Columns that a simulator with z upward has below zero.
 _UPWARD = ("sinkage_m", "displacement", "load_N")
-_OF_PLATES = ("plate", "plaque", "placa", "piastra", "penetra")
+_OF_A_PLATE = ("plate_length_m", "sinkage_m")
 _PLATES = {"plate_radius_m", "plate_diameter", "plate_width_m", "plate_area_m2"}
-_TEST = ("test", "run", "trial", "probe", "sample", "versuch", "specimen", "no", "id", "name",
-         "essai", "prova", "ensayo", "nr")  # fmt: skip
 #: How far a test advances, what is constant in it, and the share by which these jump to the next.
 _ADVANCE = ("shear_displacement_m", "sinkage_m", "displacement", "angle_rad")
 _CONSTANT, _BACK, _OTHER, _SELDOM = ("normal_stress_Pa", *sorted(_PLATES)), 0.5, 0.1, 0.25
+
+
+@cache
+def _known() -> tuple[dict[str, tuple[str, tuple[str, ...]]], dict[str, tuple[str, ...]]]:
+    """Unit and words of each of our columns, and other words by name, from the file beside this."""
+    found = tomllib.loads(Path(__file__).with_name("test_words.toml").read_text(encoding="utf-8"))
+    words = {name: tuple(own) for name, own in found["words"].items()}
+
+    def all_of(own: Sequence[str]) -> tuple[str, ...]:
+        return tuple(w for one in own for w in (words[one[1:]] if one[0] == "*" else (one,)))
+
+    return {name: (own[0], all_of(own[1:])) for name, own in found["quantities"].items()}, words
 
 
 @dataclass(frozen=True)
@@ -107,14 +84,14 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
     own = recordings[0]
     if any(n not in TEXT and n.removesuffix("_std") in COLUMNS for n in own.columns):
         return None
-    if any(_says(n, _VANE) for n in own.columns):
+    if any(_says(n, "vane") for n in own.columns):
         raise InputError(
             f"{path}: vane tests are not read: they give the undrained strength alone; needed are "
             "plate, shear or triaxial tests"
         )
     if circles := _circles(path, own):
         return circles
-    sheared = any(_says(name, _SHEAR) for name in own.columns)
+    sheared = any(_says(name, "shear", "across") for name in own.columns)
     found, taken, left_out = _taken(path, own, sheared)
     if "plate_radius_m" in found and "plate_length_m" in found and "plate_width_m" not in found:
         found["plate_width_m"] = found.pop("plate_radius_m")  # b of a strip is its width
@@ -125,7 +102,7 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
         if radius := stated_radius(agreed_constants([recordings]).common):
             found["plate_radius_m"] = np.full(len(own), radius)
             taken.append(f"plate_radius_m = {radius:g} m, as the file or its name states")
-        elif "load_N" in found and any(_says(name, _OF_PLATES) for name in own.columns):
+        elif "load_N" in found and any(_says(name, "plates") for name in own.columns):
             raise InputError(
                 f"{path}: the size of the plate is missing; needed is a column such as "
                 "'plate radius [mm]', or a line before the header, such as '# plate radius: 50 mm'"
@@ -163,13 +140,13 @@ def _taken(
     taken, left_out = [], []
     # of two stresses, the strength comes before the residual one, and the shearing before what
     # consolidated the sample
-    for name, values in sorted(own.columns.items(), key=lambda c: _says(c[0], _SECOND)):
+    for name, values in sorted(own.columns.items(), key=lambda c: _says(c[0], "second")):
         unit = _unit(own, name)
         kind = dimension(unit) if unit else None
         weight = 9.80665 if kind == "kg" else 1.0  # a scale that shows the force in kg
         column, ours = _quantity(name, "N" if kind == "kg" else kind, {*found}, sheared)
         if not column:
-            if "test" in found or not _says(name, _TEST):
+            if "test" in found or not _says(name, "test"):
                 left_out.append(repr(name))
             continue
         if not unit:
@@ -177,7 +154,9 @@ def _taken(
                 f"{path}: the column {name!r} states no unit; needed is one in its name, such as "
                 f"'{name} [mm]' or '{name} [kPa]', or the columns of `soilml bevameter --help`"
             )
-        half = column.endswith("r_radius_m") and _says(name, (*_DIAMETER, "id", "od"))
+        half = column.endswith("r_radius_m") and (
+            _says(name, "diameter") or {*words_of(name)} & {"id", "od"}
+        )
         share = weight * (0.5 if half else 1.0)
         if column in _UPWARD and np.any(values) and not np.any(values > 0.0):
             share = -share
@@ -193,13 +172,19 @@ def _unit(own: Recording, name: str) -> str:
     return unit if dimension(unit) else unit_in_name(name)
 
 
-def _says(name: str, known: Sequence[str], shortest: int = 1) -> bool:
+def _says(name: str, *groups: str) -> bool:
+    """Whether a name has a word of these groups."""
+    return any(_has(name, _known()[1][group]) for group in groups)
+
+
+def _has(name: str, known: Sequence[str], shortest: int = 1) -> bool:
     """Whether a name has one of these words, or a word of `shortest` letters that begins so."""
-    words = {*parts_of(words_of(name)), *words_of(name)}
+    words = {*parts_of(words_of(name)), *words_of(name), "".join(words_of(name))}
     plain = ["".join(c for c in normalize("NFKD", w.casefold()) if not combining(c)) for w in words]
     return any(
-        word == start or (len(start) >= _STEM and word.startswith(start))
-        for word in plain if len(word) >= shortest
+        word == start or (len(start) >= _STEM and word.startswith(start)) if start.isascii()
+        else normalize("NFKD", start) in word
+        for word in plain if len(word) >= shortest or not word.isascii()
         for start in known
     )  # fmt: skip
 
@@ -209,18 +194,20 @@ def _quantity(name: str, kind: str | None, have: set[str], sheared: bool) -> tup
     that is taken.
 
     Without a unit only words of some letters count, so that the column is asked for it. Beside a
-    shear stress a vertical displacement is none of the shear.
+    shear stress a vertical displacement is none of the shear, and no length is of a plate.
     """
-    across = _says(name, (*_VERTICAL, "normal"))
-    if sheared and across and (kind == "m" or (kind is None and _says(name, _WAYS))):
+    across = _says(name, "vertical") or {*words_of(name)} & {"normal", "v"}
+    if sheared and across and (kind == "m" or (kind is None and _says(name, "ways"))):
         return "", ""
-    for column, unit, known in _QUANTITIES:
-        if kind not in (None, unit) or not _says(name, known, _STEM + 1 if kind is None else 1):
+    for column, (unit, known) in _known()[0].items():
+        if sheared and (column in _PLATES - {"plate_area_m2"} or column in _OF_A_PLATE):
+            continue
+        if kind not in (None, unit) or not _has(name, known, _STEM + 1 if kind is None else 1):
             continue
         if column not in have:
             taken = {"displacement", _our_name("displacement", sheared)} & have
             return ("", "") if column == "displacement" and taken else (column, unit)
-        if _says(name, (*_SHEAR, *_SECOND, *_VERTICAL)) and kind == "Pa":
+        if _says(name, "shear", "second", "vertical") and kind == "Pa":
             break
     return "", ""
 
@@ -235,15 +222,16 @@ def _our_name(column: str, sheared: bool) -> str:
 def _names(own: Recording, found: dict[str, Floats]) -> tuple[str, list[str]]:
     """The column that names the test of each row, "" for none, and the names."""
     for name, cells in own.texts.items():
-        if _says(name, _TEST) or len(own.texts) == 1:
+        if _says(name, "test") or len(own.texts) == 1:
             return name, [cell or "unnamed" for cell in cells]
-    curves = any(name in found for name in _ADVANCE)
+    curves = any(name in found for name in (*_ADVANCE, "pressure_Pa"))
     for name, values in own.columns.items():
         # it numbers tests and not samples: of strengths each row is a test
         in_groups = not curves or np.unique(values).size < values.size
-        if in_groups and _says(name, _TEST) and np.isfinite(values).all():
+        if in_groups and _says(name, "test") and np.isfinite(values).all():
             return name, [f"{value:g}" for value in values]
-    number = np.cumsum(_starts(found, len(own)))
+    # of strengths without a curve each row is a test
+    number = np.cumsum(_starts(found, len(own))) if curves else np.arange(len(own))
     several = number.size and number[-1] > 0
     return "", [f"{own.file.stem}_{n + 1}" if several else own.file.stem for n in number]
 
@@ -303,11 +291,11 @@ def _triaxial(own: Recording) -> Iterator[tuple[str, str]]:
             continue
         words = {*words_of(name)}
         sigma = bool(words & {"sigma", "σ", "s"})
-        if _says(name, _PORE):
+        if _says(name, "pore"):
             yield "pore", name
-        elif _says(name, _DEVIATOR) or (sigma and {"1", "3"} <= words):
+        elif _says(name, "deviator") or (sigma and {"1", "3"} <= words):
             yield "deviator", name
-        elif _says(name, _CONFINING) or (sigma and "3" in words):
+        elif _says(name, "confining") or (sigma and "3" in words):
             yield "cell", name
         elif sigma and "1" in words:
             yield "axial", name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +12,12 @@ from soilml.config.measurement_noise import Noise
 from soilml.log_import.channels.inputs import Inputs, wheel_inputs
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.channels.wheel_quantities import Conversion, SharedError
+from soilml.log_import.checks.checked_rows import RowsToCheck
 from soilml.log_import.checks.columns import differing_units, unit_hints, with_shared_errors
-from soilml.log_import.checks.row_hints import RowsToCheck
+from soilml.log_import.checks.row_hints import hints_of
 from soilml.log_import.checks.sensors import dead_sensors, drop_clipped, untared_sensors
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
+from soilml.log_import.readers import Progress
 from soilml.log_import.rows import (
     WheelSeries,
     WindowRow,
@@ -30,8 +32,6 @@ from soilml.log_import.rows import (
 from soilml.log_import.stance_rows import stance_rows, without_rolling
 from soilml.log_import.windows.steady import Stretch, steady_windows
 from soilml.remarks import Remark
-
-Progress = Callable[[str, int, int], None]
 
 
 class WheelRows:
@@ -110,7 +110,10 @@ class WheelRows:
         """Hints at what is `wrong`, or merely odd, in rows of runs."""
         values = by_name([row.values for own in rows for row in own])
         radius = self.wheel.radius.value if self.wheel.radius is not None else None
-        for hint in RowsToCheck(values, radius, self.wheel, self.log_map.vehicle).hints():
+        weight = None
+        if (vehicle := self.log_map.vehicle) is not None:
+            weight = (vehicle.mass.value * vehicle.gravity / vehicle.wheels,) * 2
+        for hint in hints_of(RowsToCheck(values, radius, self.wheel, weight)):
             if hint.wrong == wrong:
                 yield Remark(hint.code, f"{self.log_map.source}{self.of}: {hint.text}", hint.about)
 

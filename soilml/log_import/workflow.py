@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,13 +14,13 @@ from soilml.log_import.channels.runs import runs_of, runs_of_rows
 from soilml.log_import.channels.wheel_quantities import largest_errors, wheels_by_gear
 from soilml.log_import.guesses.columns import is_size
 from soilml.log_import.mapping.log_map import LogMap, map_from, read_map
-from soilml.log_import.readers import read_log
+from soilml.log_import.readers import Progress, read_logs, silent
 from soilml.log_import.readers.side_files import log_files
 from soilml.log_import.recording import Recording
 from soilml.log_import.result import ImportedLog
 from soilml.log_import.rows import rows_as_table
 from soilml.log_import.units import dimension
-from soilml.log_import.wheel_rows import Progress, WheelRows
+from soilml.log_import.wheel_rows import WheelRows
 from soilml.quantities import column
 from soilml.remarks import Remark
 
@@ -72,26 +71,6 @@ def import_log(
     if not isinstance(log_map, LogMap):
         log_map = map_from(log_map) if isinstance(log_map, Mapping) else read_map(log_map)
     return import_recordings(read_logs(files, said), log_map, accept, said)
-
-
-def read_logs(files: Sequence[Path], progress: Progress) -> list[list[Recording]]:
-    """The recordings of each log; the progress counts bytes."""
-    sizes = [file.stat().st_size if file.is_file() else 0 for file in files]
-    total, before, recordings = sum(sizes), 0, []
-    for file, size in zip(files, sizes, strict=True):
-        progress("reading logs", before, total)
-
-        def told(done: int, before: int = before) -> None:
-            progress("reading logs", before + done, total)
-
-        recordings.append(read_log(file, told))
-        before += size
-    progress("reading logs", total, total)
-    return recordings
-
-
-def silent(stage: str, done: int, total: int) -> None:
-    """Progress that is not shown."""
 
 
 def import_recordings(

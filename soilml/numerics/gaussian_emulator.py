@@ -35,14 +35,9 @@ class GaussianEmulator:
     References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. 2.41,
     2.42 and 5.8; Sacks, Welch, Mitchell and Wynn, Statist. Sci. 4(4), 1989.
 
-    Attributes
-    ----------
-    points
-        Points (n, d) in the unit cube.
-    parts
-        The process of each output.
-    left_out
-        Error (n, k) at each point of an emulator that was fitted, with its lengths, to three
+    points: Points (n, d) in the unit cube.
+    parts: The process of each output.
+    left_out: Error (n, k) at each point of an emulator that was fitted, with its lengths, to three
         quarters of the points without it. That of all points is smaller.
     """
 

@@ -24,15 +24,10 @@ _quantile = np.vectorize(_STANDARD.inv_cdf, otypes=[np.float64])
 class Prior:
     """Distribution of a parameter between two bounds: uniform, unless stated otherwise.
 
-    Attributes
-    ----------
-    lower, upper
-        Bounds in the unit of the parameter; positive if `log`.
-    log
-        Whether the logarithm is uniform.
-    normal_std
-        Standard deviation of a normal distribution about zero, cut off at the bounds; with a lower
-        bound of zero it is half-normal. None where the distribution is uniform.
+    lower, upper: Bounds in the unit of the parameter; positive if `log`.
+    log: Whether the logarithm is uniform.
+    normal_std: Standard deviation of a normal distribution about zero, cut off at the bounds; with
+        a lower bound of zero it is half-normal. None where the distribution is uniform.
 
     Examples
     --------

@@ -8,6 +8,7 @@ that crowds the nodes at such ends cures it.
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,3 +47,19 @@ def columns(nodes: Nodes, like: Array) -> tuple[Array, Array]:
         xp.asarray(x[:, None], dtype=like.dtype, device=like.device),
         xp.asarray(weight[:, None], dtype=like.dtype, device=like.device),
     )
+
+
+def between(low: Array, inner: list[Array], high: Array, count: int) -> tuple[Array, Array]:
+    """Points (points, batch) of parts whose ends are sorted here, and what each represents.
+
+    low, inner, high: Ends of the range and of its parts, in any order between them, (batch,).
+    count: Points of each part, crowded at its ends.
+    """
+    xp = namespace(low)
+    ordered = xp.sort(xp.stack(inner, axis=0), axis=0)
+    ends = [low, *(ordered[i, :] for i in range(len(inner))), high]
+    x, weight = columns(crowded_ends(count), low)
+    lengths = [end - start for start, end in pairwise(ends)]
+    points = [start + length * x for start, length in zip(ends, lengths, strict=False)]
+    shares = [length * weight for length in lengths]
+    return xp.concat(points, axis=0), xp.concat(shares, axis=0)

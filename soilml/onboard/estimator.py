@@ -11,7 +11,7 @@ from typing import Any, NoReturn, final, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.errors import InputError, ModelFileError
+from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.exact_check import with_exact_check
 from soilml.onboard.features import flatten_readings, readings_of_frame, without_copies
@@ -19,7 +19,7 @@ from soilml.onboard.gaussian_product import product_of_rows
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.memory import Memory, check_memory, memory_identity
 from soilml.onboard.metadata import read_fields, read_prior, read_probe
-from soilml.onboard.model_file import Session, find_model, open_model
+from soilml.onboard.model_file import Session, find_model, open_model, verified
 from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS, Floats
 from soilml.onboard.set_posterior import SetPosterior, estimate_of_set
 
@@ -95,16 +95,11 @@ class Estimator:
             raise InputError(f"path is a {type(path).__name__}; needed is the name of a model file")
         file = find_model(path)
         session, metadata = open_model(file)
-        try:
-            estimator = Estimator(str(file), session=session, **read_fields(metadata))
-            passed = all(estimator._reproduces(**entry) for entry in read_probe(metadata))
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise ModelFileError(f"{file}: its metadata is damaged ({error})") from None
-        except Exception as error:  # onnxruntime raises many kinds, none with a public base
-            raise ModelFileError(f"{file} cannot be run: {' '.join(str(error).split())}") from None
-        if not passed:
-            raise ModelFileError(f"{file} fails its own probe on this machine: do not use it")
-        return estimator
+        return verified(
+            file,
+            lambda: Estimator(str(file), session=session, **read_fields(metadata)),
+            lambda found: all(found._reproduces(**entry) for entry in read_probe(metadata)),
+        )
 
     def on(self, noise: NoiseModels | None = None, **given: float) -> Estimator:
         """The same estimator for one wheel and bearing, where the file serves many wheels.
@@ -304,12 +299,19 @@ class Estimator:
         return self.sets
 
     def _set_estimate(self, rows: Mapping[str, Floats], memory: Memory) -> tuple[Estimate, Memory]:
-        """Estimate and memory after these rows (m,)."""
+        """Estimate and memory after these rows (m,), with the check against the exact model."""
+        estimate, memory = self.joint_estimate(rows, memory)
+        return with_exact_check(estimate, self._configured_sets, self.session, memory), memory
+
+    def joint_estimate(self, rows: Mapping[str, Floats], memory: Memory) -> tuple[Estimate, Memory]:
+        """Estimate after row inputs of the graph (m,), and the memory, neither packed nor sealed.
+
+        Raises `InputError` for a file without a set posterior.
+        """
         sets = self._configured_sets
         found, memory = sets.update(self.session, rows, memory)
         head = self.names, self.units, self.prior
-        estimate = estimate_of_set(*head, found, memory, sets.least_share_in_range)
-        return with_exact_check(estimate, sets, self.session, memory), memory
+        return estimate_of_set(*head, found, memory, sets.least_share_in_range), memory
 
     def __deepcopy__(self, memo: object = None) -> Estimator:
         """The estimator itself, which nothing changes."""

@@ -25,8 +25,9 @@ from soilml.onboard.set_posterior import SetPosterior, of_reason
 
 #: Share of sound sets whose misfit is above the limit of a file, and its standard normal quantile.
 FALSE_ALARM_RATE, ALARM_QUANTILE = 0.01, 2.326
-#: Beyond the largest calibrated number of readings n the limit grows by 1 + 3 / sqrt(n) a reading,
-#: as in the graph (`training.set_posterior.posterior_summary`).
+#: Beyond the largest calibrated number of readings n the limit grows by 1 + 3 / sqrt(n) a reading:
+#: that of a chi-squared distribution with n degrees of freedom is n + 3 sqrt(n) to 3 standard
+#: deviations, roughly, and a straight line through it lies above it.
 MARGIN = 3.0
 NO_ROWS: dict[str, list[float]] = {name: [] for name in REQUIRED_READINGS}
 

@@ -13,9 +13,9 @@ import json
 import os
 import re
 import stat
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 from soilml.errors import ModelFileError, did_you_mean
 from soilml.onboard.set_contract import INTERFACE
@@ -27,6 +27,7 @@ os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
 import onnxruntime as ort
 
 Session: TypeAlias = ort.InferenceSession  # A loaded ONNX file
+Opened = TypeVar("Opened")
 
 #: The key by which a tensor names the file that it is in (onnx.proto, TensorProto.external_data),
 #: with the last byte of its length before it: the runtime reads no other file without it.
@@ -126,6 +127,23 @@ def open_slip_step(path: str | os.PathLike[str], form: str) -> tuple[Session, di
         )
     _check_intact(file, content, metadata)
     return session, metadata
+
+
+def verified(file: Path, read: Callable[[], Opened], passes: Callable[[Opened], bool]) -> Opened:
+    """What is read of the metadata of a file, if it reproduces the answers of the file's probe.
+
+    Raises `ModelFileError` for damaged metadata, a file that cannot be run, and a failing probe.
+    """
+    try:
+        found = read()
+        passed = passes(found)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise ModelFileError(f"{file}: its metadata is damaged ({error})") from None
+    except Exception as error:  # onnxruntime raises many kinds, none with a public base
+        raise ModelFileError(f"{file} cannot be run: {' '.join(str(error).split())}") from None
+    if not passed:
+        raise ModelFileError(f"{file} fails its own probe on this machine: do not use it")
+    return found
 
 
 def with_checksums(graph: bytes, metadata: dict[str, str]) -> bytes:

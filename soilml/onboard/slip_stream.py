@@ -9,14 +9,15 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.errors import InputError, ModelFileError
+from soilml.errors import InputError
 from soilml.onboard.features import as_number, as_numbers
-from soilml.onboard.model_file import Session, open_slip_step
+from soilml.onboard.model_file import Session, open_slip_step, verified
 from soilml.onboard.set_contract import Floats
 from soilml.onboard.state_checksum import state_checksum
 
@@ -130,23 +131,18 @@ class SlipStream:
         a damaged one, or a failing probe.
         """
         session, metadata = open_slip_step(path, SLIP_FORMAT)
-        try:
+
+        def read() -> SlipStream:
             rover, table = json.loads(metadata["rover"]), json.loads(metadata["table"])
             low, high = (float(value) for value in table["load_N"])
             shares = np.asarray(table["load_of_attitude"], dtype=np.float64)
             wheels = tuple(str(wheel["name"]) for wheel in rover["wheels"])
             radius = np.asarray([float(wheel["radius_m"]) for wheel in rover["wheels"]])
-            found = SlipStream(
-                session, str(path), metadata, wheels, radius, (low, high), shares.reshape(-1, 3)
-            )
-            passed = found._reproduces(json.loads(metadata["probe"]))
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise ModelFileError(f"{path}: its metadata is damaged ({error})") from None
-        except Exception as error:  # onnxruntime raises many kinds, none with a public base
-            raise ModelFileError(f"{path} cannot be run: {' '.join(str(error).split())}") from None
-        if not passed:
-            raise ModelFileError(f"{path} fails its own probe on this machine: do not use it")
-        return found
+            own = wheels, radius, (low, high), shares.reshape(-1, 3)
+            return SlipStream(session, str(path), metadata, *own)
+
+        probe = metadata.get("probe", "[]")
+        return verified(Path(path), read, lambda found: found._reproduces(json.loads(probe)))
 
     @property
     def identity(self) -> str:

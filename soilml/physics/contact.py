@@ -45,7 +45,6 @@ class Contact:
     normal_lever_arm: Real | None = None  # m, of the normal stress, where it misses the axle
     shear_direction: Array | None = None  # 1 or -1, of the shear stress; None: that of the slip
     travel_ratio: Array | None = None  # v / (r omega), (batch,); None: 1 - slip
-    repeats: int = 1  # how often the depths of the first points are repeated by the others
     geometry: Any = None  # of the type that the gear's `contact_geometry` returns
 
 
@@ -88,21 +87,10 @@ def stress(contact: Contact, soil: Soil, at: Operating) -> Stress:
     """
     xp = namespace(contact.depth)
     modulus = soil.kc / contact.width + soil.kphi
-    depth = contact.depth[: contact.depth.shape[0] // contact.repeats, ...]
-    normal = modulus * xp.exp(soil.n * xp.log(depth))
+    normal = modulus * xp.exp(soil.n * xp.log(contact.depth))
     strength = soil.cohesion + normal * xp.tan(soil.friction_angle)
-    displacement = contact.shear_displacement
-    # under a driving wheel the displacement and the shear stress are positive all along the arc
-    signed = contact.repeats == 1 or bool(xp.any(at.slip < 0))
-    shear = mobilised_fraction(xp.abs(displacement) if signed else displacement, soil)
-    if contact.repeats > 1:
-        normal = xp.concat([normal] * contact.repeats, axis=0)
-        parts = xp.reshape(shear, (contact.repeats, *strength.shape))
-        shear = xp.reshape(parts * strength, shear.shape)
-    else:
-        shear = shear * strength
-    if signed:
-        shear = shear * shear_direction(contact, at)
+    shear = strength * mobilised_fraction(xp.abs(contact.shear_displacement), soil)
+    shear = shear * shear_direction(contact, at)
     return Stress(contact=contact, normal=normal, shear=shear)
 
 

@@ -67,30 +67,18 @@ class SoilOutcome:
 class DesignReport(Result):
     """Designs that were tried, the best of them, and what its margin depends on.
 
-    Attributes
-    ----------
-    study
-        The question.
-    designs
-        All designs that were tried, under the same draws.
-    best
-        Results of the best design by column name, under `DRAWS` draws of its own.
-    best_dimensions
-        Its dimensions.
-    met
-        Whether it meets the goal with the probability that the risk leaves.
-    front
-        Numbers of the designs that no other one beats in margin and in what is to be least.
-    contours
-        Designs about the best one over the first two dimensions that vary; None where fewer do.
-    by_soil
-        What the best design does on each of several soils; empty for one.
-    shares
-        First-order shares of the variance of the best design's margin.
-    tests
-        Tests that would reduce it.
-    remarks
-        What limits the answer.
+    study: The question.
+    designs: All designs that were tried, under the same draws.
+    best: Results of the best design by column name, under `DRAWS` draws of its own.
+    best_dimensions: Its dimensions.
+    met: Whether it meets the goal with the probability that the risk leaves.
+    front: Numbers of the designs that no other one beats in margin and in what is to be least.
+    contours: Designs about the best one over the first two dimensions that vary; None where fewer
+        do.
+    by_soil: What the best design does on each of several soils; empty for one.
+    shares: First-order shares of the variance of the best design's margin.
+    tests: Tests that would reduce it.
+    remarks: What limits the answer.
     """
 
     study: DesignStudy

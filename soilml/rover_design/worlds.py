@@ -54,28 +54,16 @@ KNOWN_OF_A_ROVER = {"pass_number", "slip_angle"}
 class DrawnWorlds:
     """n draws of a soil, and of the error of the model beside each.
 
-    Attributes
-    ----------
-    soil
-        Parameters (n,) in SI units by name.
-    kind
-        Number (n,) of the published soil that each is, in `kinds`.
-    errors
-        Errors (n,) by the names of `USUAL_MODEL_ERRORS`.
-    scale
-        Size (n,) of all errors over the typical ones.
-    lacking
-        Effects that the plain model lacks, with parameters (n,).
-    acts
-        Which of them act in each draw, (n, effects).
-    lug_shearing
-        Lambda of `grousers`, (n,).
-    smooth
-        Functions of slip and of load over the mean load of the wheels, for a smooth error.
-    weights
-        Weights (n, 2, q) of these functions, of drawbar pull and of torque.
-    remarks
-        What limits the draws.
+    soil: Parameters (n,) in SI units by name.
+    kind: Number (n,) of the published soil that each is, in `kinds`.
+    errors: Errors (n,) by the names of `USUAL_MODEL_ERRORS`.
+    scale: Size (n,) of all errors over the typical ones.
+    lacking: Effects that the plain model lacks, with parameters (n,).
+    acts: Which of them act in each draw, (n, effects).
+    lug_shearing: Lambda of `grousers`, (n,).
+    smooth: Functions of slip and of load over the mean load of the wheels, for a smooth error.
+    weights: Weights (n, 2, q) of these functions, of drawbar pull and of torque.
+    remarks: What limits the draws.
     """
 
     soil: Mapping[str, Floats]

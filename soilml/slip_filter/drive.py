@@ -23,6 +23,7 @@ from soilml.report.column_figure import column_picture
 from soilml.report.numbers import format_band
 from soilml.report.report import Report
 from soilml.report.tables import Column, ReportTable
+from soilml.results import Result
 from soilml.slip_filter.filter import SlipFilter
 from soilml.slip_filter.force_table import SOILS, force_table
 
@@ -61,8 +62,8 @@ class DriveRows:
     commanded: Floats  # m/s (n,); NaN where there is none
 
 
-@dataclass(frozen=True)
-class DriveSlip:
+@dataclass(frozen=True, repr=False)
+class DriveSlip(Result):
     """Speed (m/s), slips and soil of each row: 5, 50 and 95 %; NaN where refused."""
 
     rows: DriveRows
@@ -91,6 +92,75 @@ class DriveSlip:
                 said += f", {low:.2f} to {high:.2f} in the median"
             severity = "note" if code in ("standing", "behind-command") else "warning"
             yield Remark(code, said, severity=severity)  # type: ignore[arg-type]
+
+    def frame_columns(self) -> dict[str, Any]:
+        """A row for each time in SI units: medians and 90 % intervals; refused rows are blank."""
+        columns: dict[str, Any] = {"time_s": self.rows.time}
+        columns |= _band("speed_m_s", self.speed)
+        for i, name in enumerate(self.rows.wheels):
+            columns |= _band(f"slip_{name}", self.slip[:, :, i])
+        for i, name in enumerate(self.names):
+            key = QUANTITIES[name].column if name in QUANTITIES else name
+            columns |= _band(key, self.soil[:, :, i])
+        columns["no_soil"] = self.no_soil
+        columns["flags"] = np.asarray([" ".join(own) for own in self.flags])
+        return columns
+
+    def report(self, title: str = "Slip of a drive") -> Report:
+        """The report of a drive: slips at its end, how well they are known, flags."""
+        answered = self.answered
+        count, known = len(answered), int(answered.sum())
+        verdict = f"None of {count} rows has a slip: see the flags."
+        lines = [
+            f"{known} of {count} rows have a slip; {count - known} are refused or passed over."
+        ]
+        if known:
+            slip = self.slip[answered].max(axis=2)
+            low, middle, high = self.slip[np.flatnonzero(answered)[-1]].max(axis=1)
+            verdict = (
+                f"The largest slip of a wheel is {slip[:, 1].max():.2f}; at the last row it is "
+            )
+            verdict += f"{format_band(low, middle, high, digits=2)}."
+            width = np.median(slip[:, 2] - slip[:, 0])
+            lines.append(f"Half of the 90 % intervals are at most {width:.2f} wide.")
+        flags = [name for own in self.flags for name in own]
+        names = sorted(set(flags), key=flags.count, reverse=True)
+        columns = [Column("flag", names), Column("rows", [flags.count(name) for name in names])]
+        return Report(
+            kind="slip",
+            verdict=verdict,
+            lines=lines,
+            tables=[ReportTable("Flags", columns)] if names else [],
+            pictures=[
+                column_picture(
+                    self.frame_columns() | {"pitch_rad": self.rows.slope},
+                    "time_s",
+                    [[f"slip_{name}" for name in self.rows.wheels], ["speed_m_s"], ["pitch_rad"]],
+                    title="The drive",
+                    caption="Lines: medians. Bands: 90 %.",
+                )
+            ],
+            remarks=list(self.remarks()),
+            status=f"{known} of {count} rows",
+            tone="good" if known == count else "warn" if known else "bad",
+            title=title,
+            basis=f"{count} rows of {len(self.rows.wheels)} wheels",
+        )  # fmt: skip
+
+    def as_json(self) -> dict[str, Any]:
+        """Columns and remarks."""
+        columns = {
+            name: np.asarray(values).tolist() for name, values in self.frame_columns().items()
+        }
+        return {"columns": columns, "remarks": [remark.as_json() for remark in self.remarks()]}
+
+
+ENDS = ("_p05", "", "_p95")
+
+
+def _band(name: str, values: Floats) -> dict[str, Floats]:
+    """The median first, then the ends."""
+    return {f"{name}{ENDS[j]}": values[:, j] for j in (1, 0, 2)}
 
 
 def read_drive(table: Rows, case: Case) -> DriveRows:
@@ -247,69 +317,3 @@ def _after(
         yield "beyond"
     if np.max(slip[2] - slip[0]) > WIDE:
         yield "not-determined"
-
-
-ENDS = ("_p05", "", "_p95")
-
-
-def drive_columns(found: DriveSlip) -> dict[str, Any]:
-    """A row for each time, in SI units, with medians and 90 % intervals; refused rows are blank."""
-    columns: dict[str, Any] = {"time_s": found.rows.time}
-    columns |= _band("speed_m_s", found.speed)
-    for i, name in enumerate(found.rows.wheels):
-        columns |= _band(f"slip_{name}", found.slip[:, :, i])
-    for i, name in enumerate(found.names):
-        key = QUANTITIES[name].column if name in QUANTITIES else name
-        columns |= _band(key, found.soil[:, :, i])
-    columns["no_soil"] = found.no_soil
-    columns["flags"] = np.asarray([" ".join(own) for own in found.flags])
-    return columns
-
-
-def _band(name: str, values: Floats) -> dict[str, Floats]:
-    """The median first, then the ends."""
-    return {f"{name}{ENDS[j]}": values[:, j] for j in (1, 0, 2)}
-
-
-def report_of_drive(found: DriveSlip, title: str = "Slip of a drive") -> Report:
-    """The report of a drive: slips at its end, how well they are known, flags."""
-    answered = found.answered
-    count, known = len(answered), int(answered.sum())
-    verdict = f"None of {count} rows has a slip: see the flags."
-    lines = [f"{known} of {count} rows have a slip; {count - known} are refused or passed over."]
-    if known:
-        slip = found.slip[answered].max(axis=2)
-        low, middle, high = found.slip[np.flatnonzero(answered)[-1]].max(axis=1)
-        verdict = f"The largest slip of a wheel is {slip[:, 1].max():.2f}; at the last row it is "
-        verdict += f"{format_band(low, middle, high, digits=2)}."
-        width = np.median(slip[:, 2] - slip[:, 0])
-        lines.append(f"Half of the 90 % intervals are at most {width:.2f} wide.")
-    flags = [name for own in found.flags for name in own]
-    names = sorted(set(flags), key=flags.count, reverse=True)
-    columns = [Column("flag", names), Column("rows", [flags.count(name) for name in names])]
-    return Report(
-        kind="slip",
-        verdict=verdict,
-        lines=lines,
-        tables=[ReportTable("Flags", columns)] if names else [],
-        pictures=[
-            column_picture(
-                drive_columns(found) | {"pitch_rad": found.rows.slope},
-                "time_s",
-                [[f"slip_{name}" for name in found.rows.wheels], ["speed_m_s"], ["pitch_rad"]],
-                title="The drive",
-                caption="Lines: medians. Bands: 90 %.",
-            )
-        ],
-        remarks=list(found.remarks()),
-        status=f"{known} of {count} rows",
-        tone="good" if known == count else "warn" if known else "bad",
-        title=title,
-        basis=f"{count} rows of {len(found.rows.wheels)} wheels",
-    )  # fmt: skip
-
-
-def drive_json(found: DriveSlip) -> dict[str, Any]:
-    """Columns and remarks."""
-    columns = {name: np.asarray(values).tolist() for name, values in drive_columns(found).items()}
-    return {"columns": columns, "remarks": [remark.as_json() for remark in found.remarks()]}

@@ -32,23 +32,15 @@ PRIOR_DRAWS = 400
 class SourceSoil:
     """The nine parameters of a soil in SI units, and how well they are known.
 
-    Attributes
-    ----------
-    source
-        The file that was read.
-    values
-        Each parameter of `Soil` by name, in SI units.
-    origin
-        Where each value is from: `rows`, `model file` or `prior`.
-    intervals
-        Standard deviation and ends of the 90 % interval, by name, of the parameters from rows.
-    draws
-        Equally weighted draws (count,) by name, of the parameters that are uncertain; empty where
-        the file has none.
-    remarks
-        What limits the values.
-    no_draws
-        Why there are no draws; "" where there are.
+    source: The file that was read.
+    values: Each parameter of `Soil` by name, in SI units.
+    origin: Where each value is from: `rows`, `model file` or `prior`.
+    intervals: Standard deviation and ends of the 90 % interval, by name, of the parameters from
+        rows.
+    draws: Equally weighted draws (count,) by name, of the parameters that are uncertain; empty
+        where the file has none.
+    remarks: What limits the values.
+    no_draws: Why there are no draws; "" where there are.
     """
 
     source: str

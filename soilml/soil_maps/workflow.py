@@ -51,24 +51,16 @@ Progress = Callable[[str, int, int], None]
 class SoilMap(Result):
     """The soil along a drive, and what a rover does on it.
 
-    Attributes
-    ----------
-    drive, followed, soils, field
-        Rows, what became of each, estimates of stretches, and the field through them.
-    grid, known
-        Cells of the map, and which of them (cells,) are within reach of a reading.
-    score, covariance
-        Normal scores of the soil in the k cells that are known, (k, p) and (k, p, p).
-    ability
-        The rover straight up slopes; None for a model file without [rover].
-    pitch
-        Of each heading of `HEADINGS` in these cells, rad (k, 8); None without elevation.
-    by_heading
-        The rover along each heading, whose slopes are those of `pitch`, arrays (k, 8).
-    held_out
-        How well stretches are predicted that were left out; None for a short drive.
-    notes
-        Remarks on model file and trained file.
+    drive, followed, soils, field: Rows, what became of each, estimates of stretches, and the field
+        through them.
+    grid, known: Cells of the map, and which of them (cells,) are within reach of a reading.
+    score, covariance: Normal scores of the soil in the k cells that are known, (k, p) and (k, p,
+        p).
+    ability: The rover straight up slopes; None for a model file without [rover].
+    pitch: Of each heading of `HEADINGS` in these cells, rad (k, 8); None without elevation.
+    by_heading: The rover along each heading, whose slopes are those of `pitch`, arrays (k, 8).
+    held_out: How well stretches are predicted that were left out; None for a short drive.
+    notes: Remarks on model file and trained file.
     """
 
     drive: MapDrive

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
@@ -39,58 +38,18 @@ MOST_SAID = 3  # Explanations that a remark lists
 
 @dataclass(frozen=True, eq=False)
 class PosteriorDraws:
-    """Equally weighted draws of one or several posteriors.
+    """Equally weighted draws (n, p) of one or several posteriors of the same readings.
 
     case: The case with the effects of all draws, whose values are in `soil`.
-    known: Effects that the case had before.
-    several: Whether it had several explanations.
-    soil: Values (n, p).
-    parts: Posterior and draws of each group, with the numbers (k,) of the drawn ones, and of the
-        equally weighted draws (k,) that they are.
+    left: What the draws of each group leave of the readings, and the sizes of the error.
+    remarks: Which effects the draws have beside those of the case, and how often.
     """
 
     case: Case
-    known: frozenset[str]
-    several: bool
     soil: SoilDraws
-    parts: tuple[tuple[Posterior, Draws, NDArray[np.int64], NDArray[np.int64]], ...]
-
-    @property
-    def readings(self) -> Readings:
-        """The readings, which all posteriors share."""
-        return self.parts[0][0].terms.readings
-
-    def left(self) -> list[LeftByDraws]:
-        """What the draws of each group leave of the readings, and the sizes of the error."""
-        return [
-            LeftByDraws(place, _sizes(posterior, drawn), drawn.residual[taken],
-                        _whiten(posterior, drawn))
-            for posterior, drawn, taken, place in self.parts
-        ]  # fmt: skip
-
-    def remarks(self) -> list[Remark]:
-        """Which effects the draws have beside those of the case, and how often."""
-        known, shares = self.known, dict[tuple[str, ...], float]()
-        for _, part, _, place in self.parts:
-            effects = effect_names(part.node.fit.case)
-            names = tuple(n for n in effects if n not in known)
-            shares[names] = shares.get(names, 0.0) + len(place) / len(self.soil.values)
-        likely = sorted((n for n in shares if n), key=lambda n: -shares[n])
-        if 1.0 - shares.get((), 0.0) < NOTABLE:
-            return []
-        said = [f"{' + '.join(n)} ({format_probability(shares[n])})" for n in likely[:MOST_SAID]]
-        if self.several:
-            text = (
-                f"the cause of the gap is suspected, not certain: {', '.join(said)}; the bands "
-                "include each explanation as likely as it is"
-            )
-            return [Remark("suspected", text, likely[0])]
-        text = (
-            f"the model may lack an effect (first suspect: {' + '.join(likely[0])}, probability "
-            f"{format_probability(shares[likely[0]])}); the bands include each as likely as it is: "
-            "run soilml gap"
-        )
-        return [Remark("against-model", text, likely[0])]
+    readings: Readings
+    left: Sequence[LeftByDraws]
+    remarks: Sequence[Remark]
 
 
 def posterior_draws_of(
@@ -143,7 +102,8 @@ def _equally_weighted(
     first = np.cumsum([0, *(len(weight) for _, _, weight in groups)])
     paths = list(dict.fromkeys(c.path for _, part, _ in groups for c in part.node.fit.coordinates))
     values = np.tile([float(whole.numbers[path]) for path in paths], (count, 1))
-    parts = []
+    left, shares = [], dict[tuple[str, ...], float]()
+    known = effect_names(case)
     for (posterior, part, _), start, end in zip(groups, first, first[1:], strict=False):
         place = np.flatnonzero((chosen >= start) & (chosen < end))
         if not len(place):
@@ -157,9 +117,13 @@ def _equally_weighted(
                 values[place, i] = float(fixed[path])
         for i, c in enumerate(fit.coordinates):
             values[place, paths.index(c.path)] = own[:, i]
-        parts.append((posterior, part, taken, place))
-    before = frozenset(effect_names(case)), bool(case.explanations)
-    return PosteriorDraws(whole, *before, SoilDraws(tuple(paths), values), tuple(parts))
+        sizes, whiten = _sizes(posterior, part), _whiten(posterior, part)
+        left.append(LeftByDraws(place, sizes, part.residual[taken], whiten))
+        names = tuple(n for n in effect_names(fit.case) if n not in known)
+        shares[names] = shares.get(names, 0.0) + len(place) / count
+    readings = groups[0][0].terms.readings
+    remarks = _remarks(shares, bool(case.explanations))
+    return PosteriorDraws(whole, SoilDraws(tuple(paths), values), readings, left, remarks)
 
 
 def _widened(part: Draws, of_node: Sequence[Draws]) -> Draws:
@@ -206,3 +170,23 @@ def _whiten(posterior: Posterior, drawn: Draws) -> Whitening:
     kept[np.flatnonzero(terms.group == FIXED)[:count]] = False
     bare = replace(terms, columns=terms.columns[:, kept], group=terms.group[kept], _kept={})
     return bare.whiten(bare.without_discrepancy(drawn.at), drawn.node.outliers)
+
+
+def _remarks(shares: Mapping[tuple[str, ...], float], several: bool) -> list[Remark]:
+    """That effects are likely which the case lacks, by their shares of the draws."""
+    likely = sorted((n for n in shares if n), key=lambda n: -shares[n])
+    if 1.0 - shares.get((), 0.0) < NOTABLE:
+        return []
+    said = [f"{' + '.join(n)} ({format_probability(shares[n])})" for n in likely[:MOST_SAID]]
+    if several:
+        text = (
+            f"the cause of the gap is suspected, not certain: {', '.join(said)}; the bands "
+            "include each explanation as likely as it is"
+        )
+        return [Remark("suspected", text, likely[0])]
+    text = (
+        f"the model may lack an effect (first suspect: {' + '.join(likely[0])}, probability "
+        f"{format_probability(shares[likely[0]])}); the bands include each as likely as it is: "
+        "run soilml gap"
+    )
+    return [Remark("against-model", text, likely[0])]

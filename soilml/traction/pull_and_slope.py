@@ -35,22 +35,15 @@ LARGEST_SLOPE = 1.5
 class Traction:
     """Pull and slope of a running gear under one load, for n draws of the soil and m slips.
 
-    Attributes
-    ----------
-    load
-        Vertical load, N.
-    slip
-        Slips (m,).
-    pull
-        Drawbar pull on level ground, N (n, m); NaN where the soil does not carry the load.
-    slope
-        Slope that a vehicle climbs steadily, rad (n, m); negative where it only descends.
-    sinkage
-        Sinkage on level ground, m (n, m).
-    tractive_efficiency
-        Power at the drawbar over that of the drive on level ground, (n, m); NaN for a leg.
-    pull_efficiency
-        Share of the thrust that is left as pull, (n, m); NaN for a leg and for an emulator.
+    load: Vertical load, N.
+    slip: Slips (m,).
+    pull: Drawbar pull on level ground, N (n, m); NaN where the soil does not carry the load.
+    slope: Slope that a vehicle climbs steadily, rad (n, m); negative where it only descends.
+    sinkage: Sinkage on level ground, m (n, m).
+    tractive_efficiency: Power at the drawbar over that of the drive on level ground, (n, m); NaN
+        for a leg.
+    pull_efficiency: Share of the thrust that is left as pull, (n, m); NaN for a leg and for an
+        emulator.
     """
 
     load: float

@@ -56,18 +56,11 @@ _NOTATION = (
 class PullReport(Result):
     """Predictions under each load.
 
-    Attributes
-    ----------
-    rows
-        Number of rows.
-    measured_range
-        Slips and loads of the rows.
-    by_load
-        Prediction under each load.
-    measured_pull
-        Slip, load (N) and drawbar pull (N) of the k rows that measured it, (k,) each.
-    warnings
-        Those that hold for all loads.
+    rows: Number of rows.
+    measured_range: Slips and loads of the rows.
+    by_load: Prediction under each load.
+    measured_pull: Slip, load (N) and drawbar pull (N) of the k rows that measured it, (k,) each.
+    warnings: Those that hold for all loads.
     """
 
     rows: int

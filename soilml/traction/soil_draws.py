@@ -261,9 +261,9 @@ def measured_soil(
     if readings.channels == ("torque",):
         text = "torque alone hardly reveals errors of the model: measure pull or sinkage too"
         warnings.append(Remark("torque-alone", text, ("torque_Nm",)))
-    warnings += found.remarks()
+    warnings += found.remarks
     return MeasuredSoil(
-        found.case, found.soil, unknown, tuple(warnings), found.readings, found.left(),
+        found.case, found.soil, unknown, tuple(warnings), found.readings, found.left,
         INTERVAL_FACTOR,
     )  # fmt: skip
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -162,7 +161,6 @@ def export_any_wheel(
 
     Its bytes depend on the spec only.
     """
-    posterior = replace(posterior, noise=spec.noise)
     graph = Graph()
     posterior.add_to(graph)
     for name, value in posterior.defaults().items():

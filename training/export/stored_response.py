@@ -33,12 +33,12 @@ from training.set_posterior.residual_system import BOX_TOLERANCE
 from training.set_posterior.response_surface import Response, family_terms
 from training.set_posterior.validation import (
     Progress,
-    calibrate_misfit_limits,
     figures_of,
     metadata_of,
     probe_of_sets,
     table_of,
     validate_posterior,
+    with_misfit_limits,
 )
 
 CHANNELS = len(RESPONSE_CHANNELS)
@@ -61,8 +61,7 @@ def write_anew(path: Path, progress: Progress | None = None) -> None:
     posterior = _stored_posterior(model, metadata, path)
     changed: dict[str, str] = {}
     if progress is not None:
-        own = posterior.family, posterior.response, progress, posterior.small
-        posterior = replace(posterior, limits=calibrate_misfit_limits(*own).limits)
+        posterior = with_misfit_limits(posterior, progress)
         figures = validate_posterior(posterior, progress)
         changed["metrics_of_posterior"] = json.dumps(figures_of(figures))
         names = [entry["name"] for entry in json.loads(metadata["outputs"])]

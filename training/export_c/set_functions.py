@@ -35,17 +35,8 @@ from training.export_c.translation import (
     flat_nodes,
     translate,
 )
+from training.set_posterior import sampler
 from training.set_posterior.draws import LARGEST_TANH
-from training.set_posterior.sampler import (
-    DAMPING_STD,
-    LEAST_POWER,
-    OUTSIDE_PENALTY,
-    PRIOR_STEPS,
-    PROPOSAL_SCALE,
-    TEMPERING_RANGE,
-    TEMPERING_SAMPLES,
-    VARIANCE_FLOOR,
-)
 
 CHANNELS = 3  # Readings of a row
 EARLIER = (
@@ -239,11 +230,9 @@ def _values(
         named = {"sampled_part": "part", "linear_powers": "powers"}
         named |= {"linear_derivatives": "derivatives"}
         arrays |= {key: value(given, name) for key, name in named.items()}
-    numbers = {
-        "targets": int(value(posterior, "targets").flat[0]), "damping": DAMPING_STD**-2,
-        "penalty": OUTSIDE_PENALTY, "steps": PRIOR_STEPS, "widening": PROPOSAL_SCALE,
-        "most_apart": TEMPERING_RANGE, "sharing": TEMPERING_SAMPLES, "floor": VARIANCE_FLOOR,
-        "least_jacobian": 1.0 - LARGEST_TANH**2, "least_power": LEAST_POWER,
+    numbers = {name.lower(): number for name, number in vars(sampler).items() if name.isupper()} | {
+        "targets": int(value(posterior, "targets").flat[0]), "damping": sampler.DAMPING_STD**-2,
+        "least_jacobian": 1.0 - LARGEST_TANH**2,
     }  # fmt: skip
     return sizes | {"arrays": arrays, "numbers": numbers}
 

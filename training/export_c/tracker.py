@@ -46,7 +46,7 @@ def tracker_values(interface: Interface, memory_bytes: int, length: int) -> dict
     fresh = len(RESPONSE_CHANNELS) * filter_state.MOST_ROWS
     size = 2 * memory_bytes + (system_rows + fresh) * interface.columns * 4
     size += (blocks + recent + filter_state.MOST_ROWS) * BYTES_OF_A_ROW
-    return {
+    own = {
         "length": length,
         "bytes": size + OTHER_BYTES,
         "state": STATE,
@@ -56,25 +56,12 @@ def tracker_values(interface: Interface, memory_bytes: int, length: int) -> dict
         "blocks": blocks,
         "rows_per_block": per_block,
         "recent": recent,
-        "enough_known": row_window.ENOUGH_KNOWN,
-        "most_rows": filter_state.MOST_ROWS,
-        "least_rows": row_window.LEAST_ROWS,
-        "give_up_after": filter_state.GIVE_UP_AFTER,
-        "repetitions": filter_state.REPETITIONS,
-        "alive_after": filter_state.ALIVE_AFTER,
         "may_be_set": [str(n in OPERATING_NOISE).lower() for n in watched],
         "watched": watched,
         "stds": stds,
         "absent_std": ABSENT_STD,
         "model_error": any(field.name == MODEL_ERROR_INPUT for field in interface.context),
-        "all_but_right": misfit.ALL_BUT_RIGHT,
-        "quantile": misfit.QUANTILE,
-        "change_quantile": misfit.CHANGE_QUANTILE,
-        "error_degrees": misfit.ERROR_DEGREES,
-        "assumed_readings": misfit.ASSUMED_READINGS,
-        "assumed_rows": misfit.ASSUMED_ROWS,
-        "rows_judged": misfit.ROWS_JUDGED,
-        "most_excess": misfit.MOST_EXCESS,
-        "most_variance": misfit.MOST_VARIANCE,
-        "halves_every": soil_tracker.HALVES_EVERY,
     }
+    rules = (filter_state, misfit, row_window, soil_tracker)
+    constants = (item for module in rules for item in vars(module).items())
+    return {name.lower(): value for name, value in constants if name.isupper()} | own

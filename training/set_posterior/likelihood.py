@@ -23,7 +23,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, SENSOR_ERROR_COLUMNS
-from training.onnx_graph.value import Value, composite, concat, constant, either_of, gemm
+from training.onnx_graph.value import Value, composite, concat, constant, gemm
 from training.set_posterior.draws import ProposalDraws, SampleSizes
 from training.set_posterior.error_scales import ErrorScales
 from training.set_posterior.monomials import ONE, Terms, derivative
@@ -230,10 +230,4 @@ class Likelihood:
             whole, *of_z = (whole @ unknowns).last_columns(linear)
         system = concat([whole, *others, *of_z, sensors], axis=1)
         systems = system.node("Unsqueeze", system.indices([0]))
-        some = sensors.sum_of_squares(keepdims=False) > 0.0
-        (systems,) = either_of(
-            some,
-            lambda: [integrate_out(systems, OF_SENSORS)[0]],
-            lambda: systems.last_columns(OF_SENSORS)[:1],
-        )
-        return integrate_out(systems, linear)[0]
+        return integrate_out(systems, OF_SENSORS + linear)[0]

@@ -9,6 +9,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.onboard.estimate import EDGE_STDS
+from soilml.onboard.exact_check import MARGIN
 from soilml.onboard.set_contract import LEAST_SHARE_IN_RANGE, SET_PREFIX
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from training.onnx_graph.value import (
@@ -38,12 +39,6 @@ LARGEST_SHARE = 0.95
 LEAST_SHARE = 1e-6  # Least share of the sample between two grid points that is divided by
 
 
-#: The limit beyond the largest calibrated number of readings n grows by 1 + 3 / sqrt(n) a reading:
-#: that of a chi-squared distribution with n degrees of freedom is n + 3 sqrt(n) to 3 standard
-#: deviations, roughly, and a straight line through it lies above it.
-CHI_SQUARED_MARGIN = 3.0
-
-
 @dataclass(frozen=True)
 class MisfitLimits:
     """Largest accepted misfit of a set by number of readings, both rising."""
@@ -66,7 +61,7 @@ class MisfitLimits:
         place = readings.clip(0.0, float(last)).astype(np.int32)
         interpolated = constant(counts.graph, table).node("Gather", place)
         beyond = maximum(readings - float(last), 0.0)
-        limit = interpolated + beyond * (1.0 + CHI_SQUARED_MARGIN / np.sqrt(last))
+        limit = interpolated + beyond * (1.0 + MARGIN / np.sqrt(last))
         enough_in_range = rows_in_range >= rows * LEAST_SHARE_IN_RANGE
         any_reading = readings > 0.5  # a count in float32
         return limit, enough_in_range & any_reading

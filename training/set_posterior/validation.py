@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeVar
 
@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from soilml.arrays import Floats
+from soilml.onboard.exact_check import FALSE_ALARM_RATE
 from soilml.onboard.set_contract import (
     ABSENT_STD,
     COMMON_ERROR_INPUTS,
@@ -36,7 +37,6 @@ T = TypeVar("T")
 SET_SIZES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 LIMIT_SETS, FIGURE_SETS = 1500, 600
 LIMIT_SEED, FIGURE_SEED = 51, 77  # Seeds of both; the released files depend on them
-FALSE_ALARM_RATE = 0.01  # Share of consistent sets that are refused
 #: Limits are calibrated at these numbers of readings; the larger ones occur with three channels.
 READING_COUNTS = sorted(set(SET_SIZES) | {48, 64, 96})
 #: Sets whose number of readings differs by up to this factor count towards a limit, of which there
@@ -55,18 +55,16 @@ class SetFigures:
     refused: float  # share of sets that were refused; they count with the prior
 
 
-def calibrate_misfit_limits(
-    family: WheelFamily, response: Response, progress: Progress, small: bool = False
-) -> SetPosteriorGraph:
-    """The set posterior with misfit limits that refuse at most one consistent set in a hundred.
+#: Of a set posterior before its limits are measured.
+NO_LIMITS = MisfitLimits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
 
-    small: Whether it is for a microcontroller.
-    """
-    no_limits = MisfitLimits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
-    task = partial(_misfits, SetPosteriorGraph(family, response, no_limits, small=small))
+
+def with_misfit_limits(posterior: SetPosteriorGraph, progress: Progress) -> SetPosteriorGraph:
+    """The set posterior with misfit limits that refuse at most one consistent set in a hundred."""
+    task = partial(_misfits, replace(posterior, limits=NO_LIMITS))
     found = _by_size(task, "measuring misfit", progress)
     readings, misfit = (np.concatenate(part) for part in zip(*found.values(), strict=True))
-    return SetPosteriorGraph(family, response, misfit_limits(readings, misfit), small=small)
+    return replace(posterior, limits=misfit_limits(readings, misfit))
 
 
 def _misfits(posterior: SetPosteriorGraph, rows: int) -> tuple[Floats, Floats]:

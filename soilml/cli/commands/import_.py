@@ -116,7 +116,7 @@ def _init(args: argparse.Namespace) -> int:
 
     from soilml.cli.output import tell, write_stdout
     from soilml.cli.progress import stage_progress
-    from soilml.log_import.new_map import draft_map
+    from soilml.log_import.guesses.map_guess import draft_map
 
     with stage_progress() as progress:
         draft = draft_map(args.files, progress)

@@ -44,13 +44,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import working
     from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case
-    from soilml.slip_filter.drive import (
-        drive_columns,
-        drive_json,
-        read_drive,
-        report_of_drive,
-        slip_of_drive,
-    )
+    from soilml.slip_filter.drive import read_drive, slip_of_drive
 
     driven = read_long_table(args.drive, ignore_extra=args.ignore_extra)
     case = read_case(args.rover, available_effects(args), with_explanations=True)
@@ -58,5 +52,5 @@ def run(args: argparse.Namespace) -> int:
     with working(f"inferring from {len(rows.time)} rows"):
         found = slip_of_drive(case, rows)
 
-    deliver(args, report_of_drive(found), drive_json(found), drive_columns(found))
+    deliver(args, found.report(), found.as_json(), found.frame_columns())
     return 0

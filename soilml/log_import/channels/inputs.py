@@ -19,13 +19,13 @@ from soilml.log_import.channels.resampling import (
     on_grid,
     sampling_interval,
     unwrapped,
+    without_spikes,
 )
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.channels.wheel_quantities import slope_of
 from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.windows.mean_errors import mean_error
-from soilml.log_import.windows.stances import without_spikes
 from soilml.remarks import Remark
 
 SMOOTH = 0.5  # Span of the derivative of places and angles, s

@@ -22,7 +22,7 @@ from soilml.remarks import Remark
 
 #: A recording, and the kind of its file where a run has several kinds.
 Member = tuple[Recording, FileKind | None]
-_WORDS = re.compile(r"[^A-Za-z0-9.]+")
+_WORDS = re.compile(r"[^A-Za-z0-9.]+|(?<=[a-z0-9])(?=[A-Z])")
 #: Fewest different seconds, and share of the seconds that must have several lines.
 _FEWEST, _SEVERAL = 5, 0.8
 

@@ -14,12 +14,22 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.errors import FitError, InputError, MissingLibraryError
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.misfit import declared_misfit
 from soilml.fitting.operating_points import with_rover_columns
+from soilml.fitting.usable_readings import usable_readings
 from soilml.io.table import Table
-from soilml.log_import.checks.row_hints import RowsToCheck
-from soilml.log_import.checks.slip_definition import other_definition_fits
+from soilml.log_import.channels.inputs import our_slip
+from soilml.log_import.checks.checked_rows import RowsToCheck
+from soilml.log_import.checks.row_hints import hints_of
+from soilml.log_import.mapping.channel_map import SLIP_DEFINITIONS
 from soilml.quantities import COLUMNS, QUANTITIES
 from soilml.remarks import Remark
+
+#: Logarithm of the ratio of likelihoods of two definitions that is worth asking at: odds of 150.
+_DECISIVE = 5.0
+_LEAST_ROWS, _ROWS = 6, 48  # Fewest and most rows that are fitted
 
 
 def table_hints(columns: Mapping[str, Floats], radius: Floats | float | None) -> list[Remark]:
@@ -41,7 +51,7 @@ def table_hints(columns: Mapping[str, Floats], radius: Floats | float | None) ->
     rows = {COLUMNS[n].name: v for n, v in columns.items() if n in COLUMNS and v.dtype.kind == "f"}
     return [
         Remark(hint.code, hint.text, tuple(QUANTITIES[name].column for name in hint.about))
-        for hint in RowsToCheck(rows, radius).hints()
+        for hint in hints_of(RowsToCheck(rows, radius))
     ]
 
 
@@ -78,3 +88,32 @@ def _radii(table: Table, case: Case) -> NDArray[np.float64] | None:
     radii = {name: getattr(model.gear, "radius", None) for name, model in case.gears.items()}
     found = [radii.get(str(name) or first) for name in names]
     return None if any(r is None for r in found) else np.asarray(found, dtype=np.float64)
+
+
+def other_definition_fits(case: Case, table: Table) -> bool:
+    """Whether a case explains rows far better where their slip is taken as (r omega - v)/v.
+
+    Asked only of rows that the case does not explain within the declared noise as they are. Both
+    fits have the same parameters: with S the sum of squared residuals and f the degrees of
+    freedom, f/2 log(S / S') is the logarithm of the ratio of their likelihoods at noise of the size
+    that each needs. Of several runs the longest is asked, as its rows are on one soil; rows beyond
+    `_ROWS` are thinned out evenly.
+    """
+    if "run" in table:
+        table = max((rows for _, rows in table.groups("run")), key=len)
+    if len(table) < _LEAST_ROWS:
+        return False
+    rows = table.rows(np.unique(np.linspace(0, len(table) - 1, _ROWS).round().astype(int)))
+    try:
+        free = select_free(case, None)
+        readings = usable_readings(case, rows)
+        stated = declared_misfit(case, readings, free)
+        if stated is None or not stated.exceeds_noise:
+            return False
+        columns = {**rows.columns, "slip": our_slip(rows["slip"], SLIP_DEFINITIONS[2])}
+        other = declared_misfit(case, usable_readings(case, Table(columns)), free)
+    except (FitError, InputError, MissingLibraryError):
+        return False  # among others where an estimate is made on board, without scipy
+    if other is None or stated.freedom < 1:
+        return False
+    return 0.5 * stated.freedom * float(np.log(stated.squares / other.squares)) > _DECISIVE

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from soilml.io.toml_text import toml_value
 from soilml.log_import.guesses.columns import CLEAR, Candidate, says
 from soilml.log_import.guesses.constants import StatedConstants, number_in_names
 from soilml.log_import.guesses.roles import Assignment
 from soilml.log_import.mapping.channel_map import ROLES
-from soilml.log_import.mapping.written_map import Marked, WrittenTable, key_line, toml_value
+from soilml.log_import.mapping.written_map import Marked, WrittenTable, key_line
 
 #: Roles that are needed: what may stand for each, and what a map then says.
 _NEEDED = {

@@ -10,10 +10,9 @@ import numpy as np
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import CALIBRATED, Candidate, name_scores, says, words_of
 from soilml.log_import.guesses.constants import Stated, stated_radius
-from soilml.log_import.guesses.draft import Draft, inputs_of
+from soilml.log_import.guesses.draft import Draft, far_sinkage, inputs_of, lifted, signs, tares
 from soilml.log_import.guesses.evidence import BY_NAME, LEAST_PERCENT, MOST_FRACTION
 from soilml.log_import.guesses.roles import Assignment
-from soilml.log_import.guesses.signs_and_tares import far_sinkage, lifted, signs, tares
 from soilml.log_import.mapping.channel_map import GEARED, ROLES
 from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import dimension, is_raw_signal
@@ -175,7 +174,11 @@ def _put_gear_ratio(
 
 
 def draft_channels(
-    chosen: dict[str, Candidate], run: Run, stated: Stated, parts: Mapping[str, Sequence[Candidate]]
+    chosen: dict[str, Candidate],
+    run: Run,
+    steady: bool,
+    stated: Stated,
+    parts: Mapping[str, Sequence[Candidate]],
 ) -> dict[str, Draft]:
     """Tables of the channels of one wheel, with units, signs and tares as the samples show them.
 
@@ -187,7 +190,7 @@ def draft_channels(
     if rotation and ground and rotation.keys.get("unit") == "rad/s" and not rotation.column.unit:
         size = {"mm/s": 1e-3, "cm/s": 1e-2}.get(ground.keys["unit"], 1.0) * ground.column.about.size
         rotation.put("unit", *guess_rotation_unit(rotation.column.about.size, size, radius))
-    if (inputs := inputs_of(drafts, run)) is not None:
+    if (inputs := inputs_of(drafts, run, steady)) is not None:
         signs(drafts, inputs)
         tares(drafts, inputs)
         far_sinkage(drafts, inputs, radius)

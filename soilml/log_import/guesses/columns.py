@@ -242,6 +242,8 @@ def _unit_by_name(name: str) -> str:
     unit = unit_in_name(name)
     roles = name_scores(re.split(r"[_\s.\-]+", name)[0]).keys() & ROLES.keys()
     wanted = {kind for role in roles for kind in _kinds_of(role)}
+    if unit == "A" and "N m" in wanted:
+        return unit  # a torque in ampere is a current
     return "" if len(unit) == 1 and wanted and dimension(unit) not in wanted else unit
 
 

@@ -6,38 +6,45 @@ name, or where another channel confirms it. The others are marked, with the seco
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.log_import.channels.inputs import Inputs, moving
-from soilml.log_import.checks.row_hints import FAR_FROM_WEIGHT
-from soilml.log_import.checks.speed_hints import slip_without_cause
+from soilml.log_import.channels.inputs import Inputs
+from soilml.log_import.channels.wheel_quantities import Conversion
+from soilml.log_import.checks.checked_rows import RowsToCheck, other_units
+from soilml.log_import.checks.row_hints import TRACTION, hints_of
+from soilml.log_import.checks.slip_hints import FASTEST
 from soilml.log_import.guesses.columns import Candidate, says_role, wheel_word
-from soilml.log_import.guesses.draft import Draft, driving_means, travel_over_rotation
-from soilml.log_import.mapping.channel_map import UNITS
+from soilml.log_import.guesses.draft import (
+    Draft,
+    driving_means,
+    implied_radius,
+    travel_over_rotation,
+    wheel_of,
+)
+from soilml.log_import.mapping.channel_map import ROTATIONS, TRAVELS, UNITS
 from soilml.log_import.mapping.written_map import Marked
 
-#: What no wheel exceeds and what confirms a guess. Lever arm of torque over load, over the radius
-#: and in m where no radius is known; pull over load; sinkage in m.
-_LEVER, _ANY_LEVER = (0.005, 1.2), (1e-4, 0.8)
-_MOST_PULL, _ANY_SINKAGE = 1.2, 0.6
-#: T / (W r) of wheels on soil, and in m where no radius is known: outside of it by a factor of 10,
-#: a unit is another one.
-_TRACTION, _USUAL_LEVER = (0.02, 1.2), (0.004, 0.25)
+_USUAL_LEVER = (0.004, 0.25)  # T / W of wheels on soil, m, where no radius is known
 #: Travel over rotation of wheels, m; slips of a driven wheel, 5th to 95th percentile.
 _RADII, _SLIPS = (0.02, 0.6), (-0.3, 0.97)
 _TOGETHER, _FEWEST = 0.8, 6  # Correlation that confirms, and fewest means that tell it
 _OF_MASS = (0.5, 2.0)  # Load over its share of the stated mass
 _SAME_SIZE = 0.95  # Ratio of the sizes of two columns that may hold the same
+_ADDED = ("load", "drawbar_pull")  # Roles of which two equal columns may be parts of one
+_WITH_A_ZERO = ("torque", "motor_current", "drawbar_pull")  # Roles that read zero at rest
+_SET = ("load", "slip", "slope")  # Roles that a rig may keep at one value
 #: Largest fraction that a column of slip may hold, and the least one of per cent: (r omega - v)/v
-#: lies between.
-MOST_FRACTION, LEAST_PERCENT = 1.0, 5.0
+#: lies between, and above 30 it were a slip of 0.97.
+MOST_FRACTION, LEAST_PERCENT, _SURELY_PERCENT = 1.0, 5.0, 30.0
 BY_NAME = "by its name"  # Why a unit is known that no brackets state, as of ticks and rpm
 _PAIRS = (("torque", "drawbar_pull"), ("motor_current", "drawbar_pull"), ("torque", "slip"),
           ("sinkage", "slip"), ("sinkage", "torque"), ("motor_current", "torque"))  # fmt: skip
+_OF_NO_MAP = ("odd-row", "constant-reading")  # Hints that doubt rows and sensors
 
 
 @dataclass
@@ -80,23 +87,24 @@ class GuessEvidence:
 def weigh(
     drafts: Mapping[str, Draft],
     inputs: Inputs | None,
-    constants: Mapping[str, float],
+    radius: float,
+    weight: tuple[float, float] | None,
     seconds: Mapping[str, Sequence[Candidate]],
     columns: Sequence[Candidate],
     shown: Mapping[str, str],
-    doubts: Mapping[str, str],
+    over_time: bool = True,
 ) -> list[GuessEvidence]:
     """The evidence for each channel of a wheel that is a column; those without are marked.
 
     inputs: Samples as the drafts read them; None where they cannot be read.
-    constants: Stated `radius` (m), and `weight` (N) on each wheel with the `least_weight` that it
-        may be where nothing says how many carry it, as far as they are known.
+    radius: As stated, m; 0 where it is not.
+    weight: Least and largest weight on each wheel by the stated mass, N; None without one.
     seconds: The next columns by role.
-    shown, doubts: What the behaviour of several alike columns has shown, and what the rows of the
-        map say against it, by role.
+    shown: What the behaviour of several alike columns has shown, by role.
+    over_time: Whether a wheel that rests would be seen; not in rows that are steady runs.
     """
-    found = {}
     used = {draft.column.address for draft in drafts.values()}
+    found = {}
     for role, draft in drafts.items():
         own, others = draft.column, seconds.get(role, ())
         stated = own.unit if own.kind not in (None, "other") else ""
@@ -110,17 +118,25 @@ def weigh(
         )  # fmt: skip
         if role in shown and not isinstance(shown[role], Marked) and stated:
             found[role].physics = shown[role]
+        if own.about.constant and role not in _SET:
+            found[role].against = f"it reads {own.about.middle:.3g} throughout"
     if inputs is not None:
-        for role, why in _impossible(inputs, constants).items():
-            if role in found:
-                found[role].against = why
-        for role, why in _confirmed(found, drafts, inputs, constants, columns):
+        means = driving_means(inputs)
+        marked = {role for role, why in shown.items() if isinstance(why, Marked)}
+        marked |= {role for role, draft in drafts.items() if draft.is_marked}
+        for roles, why in _doubts(drafts, means, radius, weight):
+            # what a channel that is marked already explains is doubted no more
+            for role in roles if marked.isdisjoint(roles) else ():
+                found[role].against = found[role].against or why
+        for role, why in _confirmed(found, drafts, means, radius, weight, columns):
             if role in found and not found[role].physics:
                 found[role].physics = why
+        never_rests = over_time and inputs.speed is not None and not inputs.rest
+        for role in {*_WITH_A_ZERO} & found.keys() if never_rests else ():
+            why = "the wheel never rests in the log, so that nothing shows where its zero is"
+            found[role].against = found[role].against or why
     for role, one in found.items():
         comments = drafts[role].comments
-        if not drafts[role].is_marked:  # one mark suffices
-            one.against = one.against or doubts.get(role, "")
         said = comments.get("column", "")
         if not one.silent and not isinstance(said, Marked):
             comments["column"] = Marked(f"{one.mark}; {said}" if said else one.mark)
@@ -128,26 +144,59 @@ def weigh(
 
 
 def _rival(role: str, own: Candidate, others: Sequence[Candidate]) -> str:
-    """A column of other values whose name fits a role as well; "" for none, as of other wheels."""
+    """A column of other values whose name fits a role as well; "" for none, as of other wheels.
+
+    Of forces that may add up, equal ones are two sensors, or the same one twice.
+    """
     for other in others:
         same = other.kind == own.kind and other.scores.get(role, 0.0) >= own.scores[role]
         sizes = sorted((own.about.size, other.about.size))
-        if same and not wheel_word(other.address) and sizes[0] < _SAME_SIZE * sizes[1]:
+        other_values = role in _ADDED or sizes[0] < _SAME_SIZE * sizes[1]
+        if same and other_values and not wheel_word(other.address):
             return other.address
     return ""
+
+
+def _doubts(
+    drafts: Mapping[str, Draft],
+    means: Mapping[str, Floats],
+    radius: float,
+    weight: tuple[float, float] | None,
+) -> Iterator[tuple[list[str], str]]:
+    """What the checks of rows say against channels, where seconds of driving are the rows.
+
+    Where no radius is stated, it is the largest travel over rotation.
+    """
+    implied = implied_radius(drafts, means)
+    of_wheel = radius or (implied if _RADII[0] < implied < _RADII[1] else 0.0)
+    known = radius or (implied if implied > 0.0 else None)
+    wheel = wheel_of(drafts, known)
+    rows = Conversion(wheel, None).of(means)
+    for hint in hints_of(RowsToCheck(rows, of_wheel or None, wheel, weight)):
+        roles = [role for role in hint.about if role in drafts]
+        if hint.code not in _OF_NO_MAP:
+            yield roles, hint.text
 
 
 def _confirmed(
     found: Mapping[str, GuessEvidence],
     drafts: Mapping[str, Draft],
-    inputs: Inputs,
-    constants: Mapping[str, float],
+    means: Mapping[str, Floats],
+    radius: float,
+    weight: tuple[float, float] | None,
     columns: Sequence[Candidate],
 ) -> Iterator[tuple[str, str]]:
-    """Roles that another channel confirms, and how."""
-    means, radius = driving_means(inputs), constants.get("radius", 0.0)
-    turning = next((r for r in ("rim_speed", "wheel_speed", "wheel_angle") if r in found), "")
-    travel = next((r for r in ("ground_speed", "position") if r in found), "")
+    """Roles that another channel confirms, and how.
+
+    A unit that is not stated is confirmed where none of those that loggers write fits as well.
+    """
+
+    def only_unit(role: str, fits: Callable[[float], bool]) -> bool:
+        others = other_units(role, str(drafts[role].keys.get("unit", "")))
+        return bool(found[role].unit) or not any(map(fits, others.values()))
+
+    turning = next((r for r in ROTATIONS if r in found), "")
+    travel = next((r for r in TRAVELS if r in found), "")
     ratio = travel_over_rotation(means)
     ratio = ratio[np.isfinite(ratio)]
     # the ratio of two measurements has some scatter
@@ -156,7 +205,12 @@ def _confirmed(
         radius_here = 1.0 if turning == "rim_speed" else radius
         low, high = (float(x) for x in np.percentile(ratio, [5, 95]))
         slips = (1.0 - high / radius_here, 1.0 - low / radius_here) if radius_here else (9, 9)
-        if _SLIPS[0] < slips[0] and slips[1] < _SLIPS[1]:
+
+        def fits(size: float) -> bool:
+            return FASTEST[0] < high / radius_here * size < FASTEST[1]
+
+        usual = _SLIPS[0] < slips[0] and slips[1] < _SLIPS[1]
+        if usual and only_unit(turning, lambda size: fits(1 / size)) and only_unit(travel, fits):
             why = f"slip is {slips[0]:.2g} to {slips[1]:.2g}"
             yield from ((role, why) for role in (turning, travel))
         of_wheel = _RADII[0] < high < _RADII[1]
@@ -165,18 +219,19 @@ def _confirmed(
             yield from ((role, why) for role in (turning, travel))
         radius = radius or (high if of_wheel else 0.0)
     size = float(np.nanmedian(np.abs(means["load"]))) if "load" in means else 0.0
-    weight = constants.get("weight", 0.0)
-    if size and weight and _OF_MASS[0] < size / weight < _OF_MASS[1]:
-        yield "load", f"the stated mass gives {weight:.3g} N, and it shows {size:.3g} N"
-    if size and "torque" in means:
+    if size and weight and _OF_MASS[0] < size / weight[1] < _OF_MASS[1]:
+        yield "load", f"the stated mass gives {weight[1]:.3g} N, and it shows {size:.3g} N"
+    if size and "torque" in means and "torque" in found:
         lever = float(np.nanmedian(np.abs(means["torque"]))) / size
-        low, high = (r * radius for r in _TRACTION) if radius else _USUAL_LEVER
+        low, high = (r * radius for r in TRACTION) if radius else _USUAL_LEVER
         why = f"torque over load is {lever:.2g} m, as of a wheel"
-        units = {role: role in found and found[role].unit for role in ("torque", "load")}
-        for role, other in (("torque", "load"), ("load", "torque")) if low < lever < high else ():
-            alone = sum(c.kind == UNITS[role] for c in columns) == 1
-            known = role in found and (found[role].word or (units[role] and alone))
-            if known and (units[other] or (other == "load" and other not in found)):
+        for role, other, power in (("torque", "load", 1), ("load", "torque", -1)):
+            if not low < lever < high or role not in found:
+                continue
+            alone = bool(found[role].unit) and sum(c.kind == UNITS[role] for c in columns) == 1
+            if (other in found and not found[other].unit) or not (found[role].word or alone):
+                continue
+            if only_unit(role, partial(_between, low / lever, high / lever, power)):
                 yield role, why
     for pair in _PAIRS:
         if _correlation(means, *pair) > _TOGETHER:
@@ -185,9 +240,13 @@ def _confirmed(
     if "slip" in means and "slip" in found and found["slip"].word:
         low, high = float(np.nanmin(means["slip"])), float(np.nanmax(means["slip"]))
         given = 100.0 * high if drafts["slip"].keys.get("unit") == "%" else high
-        known = 0.02 < given <= MOST_FRACTION or given >= LEAST_PERCENT
+        known = 0.02 < given <= MOST_FRACTION or given >= _SURELY_PERCENT
         if low >= -1.0 and high <= 1.0 and known and not drafts["slip"].is_marked:
             yield "slip", f"it lies between {low:.2g} and {high:.2g}"
+
+
+def _between(low: float, high: float, power: int, size: float) -> bool:
+    return low < size**power < high
 
 
 def _correlation(means: Mapping[str, Floats], one: str, other: str) -> float:
@@ -199,43 +258,3 @@ def _correlation(means: Mapping[str, Floats], one: str, other: str) -> float:
     if both.shape[1] < _FEWEST or not np.ptp(both, axis=1).all():
         return 0.0
     return abs(float(np.corrcoef(*both)[0, 1]))
-
-
-def _impossible(inputs: Inputs, constants: Mapping[str, float]) -> dict[str, str]:
-    """Why the values of a role are those of no wheel, by role."""
-    driven, radius = moving(inputs), constants.get("radius", 0.0)
-    sizes = {
-        role: float(np.nanpercentile(np.abs(inputs.values[role][driven]), 75))
-        for role in ("load", "torque", "drawbar_pull", "sinkage")
-        if role in inputs.values and np.isfinite(inputs.values[role][driven]).any()
-    }
-    found: dict[str, str] = {}
-    means = driving_means(inputs)
-    ratio = travel_over_rotation(means)
-    if ratio.size and "torque" in means:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            effort = means["torque"] / means.get("load", 1.0)
-        if slip_without_cause(ratio, effort):
-            why = "it follows the rotation however much the wheel works: computed from it?"
-            found |= dict.fromkeys(("ground_speed", "position"), why)
-    load = sizes.get("load", inputs.constants.get("load", 0.0))
-    if "load" in sizes and "weight" in constants and not (
-        constants["least_weight"] < FAR_FROM_WEIGHT * load
-        and load < FAR_FROM_WEIGHT * constants["weight"]
-    ):  # fmt: skip
-        share = load / constants["weight"]
-        found["load"] = f"it is {share:.2g} times what the stated mass gives for each wheel"
-    if load > 0.0 and "torque" in sizes:
-        low, high = _LEVER if radius > 0.0 else _ANY_LEVER
-        lever = sizes["torque"] / load / (radius if radius > 0.0 else 1.0)
-        if not low < lever < high:
-            shown = f"{lever:.3g} {'times the radius' if radius > 0.0 else 'm'}"
-            why = f"torque over load is {shown}: one of them is something else"
-            found |= dict.fromkeys(("torque", "load"), why)
-    if load > 0.0 and sizes.get("drawbar_pull", 0.0) > _MOST_PULL * load:
-        why = f"the pull is {sizes['drawbar_pull'] / load:.3g} times this load"
-        found |= dict.fromkeys(("drawbar_pull", "load"), why)
-    most = radius if radius > 0.0 else _ANY_SINKAGE
-    if sizes.get("sinkage", 0.0) > most and "sinkage" not in inputs.tare:
-        found["sinkage"] = f"{sizes['sinkage']:.3g} m is no sinkage of a wheel"
-    return found

@@ -1,12 +1,13 @@
-"""A guess of the map of logs that nobody has described: each entry with its reason."""
+"""A guess of the map of logs that nobody has described: `soilml import --init`."""
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
+from soilml.io.toml_text import toml_key
 from soilml.log_import.channels.runs import matched_files, run_names, runs_of
 from soilml.log_import.guesses.absent_channels import AbsentChannels
 from soilml.log_import.guesses.channel_drafts import add_errors, draft_channels, is_error
@@ -31,13 +32,21 @@ from soilml.log_import.guesses.columns import (
     says,
 )
 from soilml.log_import.guesses.constants import agreed_constants, gears_in_names, stated_radius
-from soilml.log_import.guesses.draft import Draft, fastest_ratio, inputs_of, radius_of_slip
+from soilml.log_import.guesses.draft import (
+    Draft,
+    driving_means,
+    implied_radius,
+    inputs_of,
+    radius_of_slip,
+)
 from soilml.log_import.guesses.evidence import weigh
 from soilml.log_import.guesses.forces import by_behaviour
 from soilml.log_import.guesses.roles import assign, axle_of
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap, RunsMap, TimeMap
-from soilml.log_import.mapping.written_map import Marked, WrittenMap, WrittenTable, toml_value
+from soilml.log_import.mapping.written_map import Marked, WrittenMap, WrittenTable
+from soilml.log_import.readers import Progress, read_logs, silent
+from soilml.log_import.readers.side_files import log_files
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
 
@@ -133,15 +142,16 @@ class MapGuess:
             return tuple(replace(kind, clock="start") for kind in named)
         return tuple(named)
 
-    def map(self, doubts: Mapping[str, str] | None = None) -> WrittenMap:
-        """The whole map, with a mark on the channels that its own rows put in doubt, by role."""
+    def map(self) -> WrittenMap:
+        """The whole map, with a mark on the channels that lack evidence."""
         stated, shared, wheels = self.stated.common, self.found.shared, self.found.wheels
-        constants, explained = self._constants(), []
+        radius, weight, explained = stated_radius(stated), self._weight(), []
         drafts: dict[str, dict[str, Draft]] = {}
         for name, own in (wheels or {"": {}}).items():
-            group = draft_channels(shared | own, self.run, stated, self.found.parts)
-            evidence = weigh(group, inputs_of(group, self.run), constants, self.found.others,
-                             self.usable, self.reasons, doubts or {})  # fmt: skip
+            steady = self.steady > 0
+            group = draft_channels(shared | own, self.run, steady, stated, self.found.parts)
+            evidence = weigh(group, inputs_of(group, self.run, steady), radius, weight,
+                             self.found.others, self.usable, self.reasons, not steady)  # fmt: skip
             explained += [f"wheel {name}\n" if name else "", *map(str, evidence)]
             for role, draft in group.items():
                 if others := [c.address for c in self.found.others.get(role, [])[:4]]:
@@ -181,18 +191,16 @@ class MapGuess:
                 tables.append(draft.only(f"wheels.{name}.{role}", left))
         return WrittenMap(self._head(), [*tables, *(() if self.steady else self._window_tables())])
 
-    def _constants(self) -> dict[str, float]:
-        """Radius (m) and weight on each wheel (N), as far as the logs state them."""
-        stated, found = self.stated.common, {}
-        if radius := stated_radius(stated):
-            found["radius"] = radius
-        if "mass" in stated:
-            count = int(stated.get("wheels", (str(max(1, len(self.found.wheels))), ""))[0])
-            mass, _, unit = stated["mass"][0].partition(" ")
-            found["weight"] = 9.80665 * float(mass) * factor(unit or "kg", "kg", "mass") / count
-            known = "wheels" in stated or len(self.found.wheels) > 1
-            found["least_weight"] = found["weight"] / (1 if known else _MOST_WHEELS)
-        return found
+    def _weight(self) -> tuple[float, float] | None:
+        """Least and largest weight on each wheel by the stated mass, N; None without one."""
+        stated = self.stated.common
+        if "mass" not in stated:
+            return None
+        count = int(stated.get("wheels", (str(max(1, len(self.found.wheels))), ""))[0])
+        mass, _, unit = stated["mass"][0].partition(" ")
+        weight = 9.80665 * float(mass) * factor(unit or "kg", "kg", "mass") / count
+        known = "wheels" in stated or len(self.found.wheels) > 1
+        return weight / (1 if known else _MOST_WHEELS), weight
 
     def _head(self) -> list[str]:
         names = run_names([log[0].file for log in self.logs])
@@ -255,8 +263,7 @@ class MapGuess:
             wheel.put("gear_from", pattern, why)
             tables = [wheel]
             for name, (key, value) in gears.items():
-                plain = re.fullmatch(r"[A-Za-z0-9_-]+", name)
-                table = WrittenTable(f"gears.{name if plain else toml_value(name)}")
+                table = WrittenTable(f"gears.{toml_key(name)}")
                 table.put(key, f"{value} +- 1 %", "by the names")
                 tables.append(table)
             return tables
@@ -275,7 +282,7 @@ class MapGuess:
         roles = self.found.roles()
         turning = {"wheel_speed", "wheel_angle"} & roles
         needed = bool(turning) and not {"slip", "rim_speed"} & roles
-        inputs = inputs_of(drafts, self.run) if turning else None
+        inputs = inputs_of(drafts, self.run, self.steady > 0) if turning else None
         # where rotation is of the motor
         gear = math.prod(float(drafts[role].keys.get("gear_ratio", 1.0)) for role in turning)
         slips = [*self.found.others.get("slip", [])]
@@ -288,7 +295,9 @@ class MapGuess:
                     why = Marked(f"CHANGE: {why}, which was perhaps set and not measured")
                 wheel.put("radius", f"{gear * radius:.3g} m +- 1 %", why)
                 return
-        ratio = gear * fastest_ratio(inputs) if inputs is not None and needed else math.nan
+        ratio = math.nan
+        if inputs is not None and needed:
+            ratio = implied_radius(drafts, driving_means(inputs, 2.0))
         hint = ""
         if ratio > 0.0:
             hint = f"; travel over rotation is {ratio:.3g} m"
@@ -316,3 +325,33 @@ class MapGuess:
             '# why = "the carriage was pulled"',
         ]
         return [table, WrittenTable(before=example)]
+
+
+@dataclass(frozen=True)
+class DraftedMap:
+    """A map as TOML with comments, how many of its lines are marked, and the evidence as text."""
+
+    text: str
+    marked: int
+    evidence: str
+
+
+def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
+    """Look at logs and write a map with guesses, each with its reason, as TOML with comments.
+
+    Guesses come from names, units and the behaviour of the values; checks of seconds of driving
+    mark what they doubt. What no log shows, such as the radius, is marked with CHANGE or NEEDED.
+
+    Raises `InputError` where a file cannot be read or has no columns.
+    """
+    return draft_map(logs).text
+
+
+def draft_map(
+    logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], progress: Progress = silent
+) -> DraftedMap:
+    """What `init_map` gives, with the number of lines that are marked."""
+    recordings = read_logs(log_files(logs), progress)
+    guess = MapGuess(recordings)
+    found = guess.map()
+    return DraftedMap(found.text, found.marked, guess.evidence)

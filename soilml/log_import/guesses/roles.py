@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from soilml.log_import.guesses.columns import WHEEL_WORDS, Candidate, says, wheel_word, words_of
-from soilml.log_import.guesses.vertical_axis import OF_A_ROVER, is_vertical
+from soilml.log_import.guesses.forces import OF_A_ROVER, is_vertical
 
 _ACCELERATIONS = words_of(
     "acc accel acceleration beschleunigung aceleracion aceleración accelerazione accélération ax"

@@ -105,6 +105,8 @@ LEG_ROLES: dict[str, tuple[str, str]] = {
     "clearance": ("m", "distance from a range-finder straight down to the ground"),
 }
 UNITS = {role: unit for role, (unit, _) in (ROLES | LEG_ROLES).items()}
+#: Channels from which slip follows: rotation and travel, the better one first.
+ROTATIONS, TRAVELS = ("rim_speed", "wheel_angle", "wheel_speed"), ("position", "ground_speed")
 #: Channels that an encoder before the gearbox, or a motor, may give.
 GEARED = ("wheel_speed", "wheel_angle", "torque", "motor_current")
 _TORQUES, _CURRENT = For(("torque", "motor_current")), For(("motor_current",))

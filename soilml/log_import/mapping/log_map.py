@@ -24,6 +24,8 @@ from soilml.log_import.mapping.channel_map import (
     LEG_ROLES,
     NOTHING,
     ROLES,
+    ROTATIONS,
+    TRAVELS,
     ChannelMap,
     Uncertain,
     UncertainIn,
@@ -304,9 +306,8 @@ def _check_wheel(
     """Raise `InputError` where slip or load cannot follow from the channels of a wheel."""
     has = wheel.channels.keys()
     of = f" of the wheel {wheel.name!r}" if wheel.name else ""
-    rotation, travel = ("wheel_speed", "wheel_angle", "rim_speed"), ("ground_speed", "position")
     if "slip" not in has and wheel.leg is None:
-        for needed, words in ((rotation, "rotation"), (travel, "travel")):
+        for needed, words in ((ROTATIONS, "rotation"), (TRAVELS, "travel")):
             if not has & {*needed}:
                 settings.fail(
                     f"the {words}{of} is missing, from which slip follows; needed is one of "

@@ -2,35 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
-from soilml.io.cell_text import is_plain, one_line
+from soilml.io.cell_text import one_line
+from soilml.io.toml_text import toml_value
 from soilml.optional_imports import tomllib
 
 
 class Marked(str):
     """A line of a map, or the comment of a key, with what no log shows: a person must look."""
-
-
-def toml_value(value: Any) -> str:
-    """A value in TOML: numbers without needless digits, patterns in single quotes.
-
-    Characters that are not plain are written as escapes, and half a pair of surrogates, which TOML
-    does not have, as a question mark.
-    """
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float | int | np.number):
-        return f"{float(value):g}" if float(value) != int(value) else f"{int(value)}"
-    if isinstance(value, str) and "\\" in value and "'" not in value and is_plain(value):
-        return f"'{value}'"
-    written = json.dumps(value, ensure_ascii=False).encode("utf-8", "replace").decode()
-    return "".join(c if is_plain(c) else f"\\U{ord(c):08x}" for c in written)
 
 
 def key_line(key: str, value: Any, comment: str = "") -> str:
@@ -56,7 +38,8 @@ class WrittenTable:
 
     def put(self, key: str, value: Any, why: str = "") -> None:
         """Set a key and its comment."""
-        self.keys[key] = value
+        whole = isinstance(value, float) and value.is_integer()
+        self.keys[key] = int(value) if whole else value
         if why:
             self.comments[key] = why
 

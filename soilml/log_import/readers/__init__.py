@@ -5,7 +5,7 @@ They import their libraries when they are called.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -17,6 +17,7 @@ from soilml.log_import.readers.missing_codes import without_codes
 from soilml.log_import.readers.side_files import side_lines
 from soilml.log_import.recording import Recording
 
+Progress = Callable[[str, int, int], None]  # Of a stage: items done, and their number
 #: Ending -> module and function; any other ending is read as text.
 _READERS = {
     ".parquet": ("parquet_log", "read_parquet_log"),
@@ -79,3 +80,23 @@ def read_log(path: str | Path, progress: Callable[[int], None] | None = None) ->
         return [replace(own, about=(*own.about, *beside)) for own in found_in]
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from None
+
+
+def read_logs(files: Sequence[Path], progress: Progress) -> list[list[Recording]]:
+    """The recordings of each log; the progress counts bytes."""
+    sizes = [file.stat().st_size if file.is_file() else 0 for file in files]
+    total, before, recordings = sum(sizes), 0, []
+    for file, size in zip(files, sizes, strict=True):
+        progress("reading logs", before, total)
+
+        def told(done: int, before: int = before) -> None:
+            progress("reading logs", before + done, total)
+
+        recordings.append(read_log(file, told))
+        before += size
+    progress("reading logs", total, total)
+    return recordings
+
+
+def silent(stage: str, done: int, total: int) -> None:
+    """Progress that is not shown."""

@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.errors import InputError
 from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
+from soilml.onboard.exact_check import NO_ROWS
 from soilml.onboard.memory import Memory
 from soilml.onboard.set_contract import INFERRED, MODEL_ERROR_INPUT
-from soilml.onboard.set_posterior import estimate_of_set
 
 QUANTILE = 3.72  # Standard normal quantile beyond which a misfit is not chance: 1 in 10 000
 #: The same for the last rows together, of which one number is tried after each row: 1 in 1000.
@@ -63,18 +62,12 @@ def judging(estimator: Estimator) -> Estimator:
 
 def fit_rows(estimator: Estimator, rows: Rows, memory: Memory) -> JointFit:
     """The fit to the rows of a packed memory and to further ones (m,); m may be 0."""
-    if estimator.sets is None:
-        raise InputError(f"{estimator.path} has no set posterior; train it with [set_posterior]")
-    found, after = estimator.sets.update(estimator.session, rows, memory)
-    head, least = (estimator.names, estimator.units, estimator.prior), estimator.sets
-    share = least.least_share_in_range
-    return JointFit(estimate_of_set(*head, found, after, share), after)
+    return JointFit(*estimator.joint_estimate(rows, memory))
 
 
 def fit_memory(estimator: Estimator, memory: Memory) -> JointFit:
     """The fit to the rows of a memory."""
-    nothing: dict[str, list[float]] = {"slip": [], "torque": [], "load": []}
-    return fit_rows(estimator, estimator.sets.rows(nothing) if estimator.sets else {}, memory)
+    return fit_rows(estimator, estimator.sets.rows(NO_ROWS) if estimator.sets else {}, memory)
 
 
 def with_noise(memory: Memory, variance: float) -> Memory:

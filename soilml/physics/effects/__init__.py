@@ -7,7 +7,7 @@ listings and searches follow, is the order of the lines below.
 # The imports are not sorted or wrapped: their order is that of the catalogue, one line each.
 # ruff: isort: skip_file
 # fmt: off
-from soilml.physics.effects.base import Effect as Effect, EffectCard as EffectCard
+from soilml.physics.effects.base import Effect as Effect, EffectCard as EffectCard, effect as effect
 from soilml.physics.effects.soil_changes import SlipSinkage as SlipSinkage
 from soilml.physics.effects.grousers import Grousers as Grousers
 from soilml.physics.effects.grousers import TrackGrousers as TrackGrousers
@@ -57,4 +57,4 @@ _CATALOGUE = {
     if isinstance(value, type) and issubclass(value, Effect) and value is not Effect
 }
 #: Effect by the name that `[[effect]] name` takes in a model file.
-EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in _CATALOGUE.values()}
+EFFECTS: dict[str, type[Effect]] = {own.name: own for own in _CATALOGUE.values()}

@@ -77,9 +77,9 @@ class EffectCard:
 class Effect:
     """A named pure function of one stage of a model, or of several.
 
-    An effect is a frozen dataclass of its parameters that derives from this class and overrides
-    the stages that it acts at; the others pass their value on unchanged. With its parameters at
-    their defaults an effect changes nothing, to the last bit.
+    An effect is a frozen dataclass of its parameters, which the decorator `effect` makes of a class
+    that derives from this one and overrides the stages that it acts at; the others pass their value
+    on unchanged. With its parameters at their defaults it changes nothing, to the last bit.
 
     Raises `InputError` when a subclass is defined with a public method that begins with ``on_`` and
     is not one of `STAGES`.
@@ -88,23 +88,21 @@ class Effect:
     --------
     A sensor that reads 2 mm too deep:
 
-    >>> from dataclasses import dataclass, replace
-    >>> from typing import Annotated, ClassVar
+    >>> from dataclasses import replace
+    >>> from typing import Annotated
     >>> from soilml.arrays import Real
     >>> from soilml.parameters import Parameter
-    >>> from soilml.physics.contact import Force
-    >>> from soilml.physics.effects import Effect, EffectCard
-    >>> @dataclass(frozen=True, kw_only=True)
+    >>> from soilml.physics.effects import Effect, effect
+    >>> @effect(
+    ...     "zero",
+    ...     text="the zero of the sinkage sensor is off",
+    ...     source="linear sensor error",
+    ...     kind="sensor",
+    ...     reference={"offset": 0.002},
+    ...     signs={"sinkage": +1},
+    ...     isolate="the wheel on a plate",
+    ... )
     ... class Zero(Effect):
-    ...     name: ClassVar[str] = "zero"
-    ...     about: ClassVar[EffectCard] = EffectCard(
-    ...         text="the zero of the sinkage sensor is off",
-    ...         source="linear sensor error",
-    ...         kind="sensor",
-    ...         reference={"offset": 0.002},
-    ...         signs={"sinkage": +1},
-    ...         isolate="the wheel on a plate",
-    ...     )
     ...     offset: Annotated[Real, Parameter("m", -0.05, 0.05)] = 0.0
     ...
     ...     def on_reading(self, force, load_case):

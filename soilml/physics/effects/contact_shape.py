@@ -124,15 +124,7 @@ class WheelFlexibility(SlipLoadScaling):
         larger = 1.0 + deflection / rim.sinkage
         radius = rim.radius * larger
         entry = entry_angle(rim.sinkage, radius)
-        share = entry / rim.entry
-        return replace(
-            rim,
-            entry=entry,
-            peak=rim.peak * share,
-            exit=rim.exit * share,
-            radius=radius,
-            shear_radius=rim.shear_radius * larger,
-        )
+        return rim.with_entry(entry, radius=radius, shear_radius=rim.shear_radius * larger)
 
 
 MOST_DEFLECTION = 0.3  # Largest deflection, as a fraction of the radius
@@ -179,13 +171,7 @@ class FlatRim(SlipLoadScaling):
         deflection = xp.minimum(deflection, most) + 0.0 * rim.entry
         entry = entry_angle(rim.sinkage + deflection, rim.radius)
         chord = entry_angle(deflection, rim.radius)
-        return replace(
-            rim,
-            entry=entry,
-            peak=rim.peak * (entry / rim.entry),
-            exit=rim.exit - chord,
-            chord=chord,
-        )
+        return rim.with_entry(entry, exit=rim.exit - chord, chord=chord)
 
 
 @effect(
@@ -221,13 +207,8 @@ class Clogging(SlipLoadScaling):
     def on_contact(self, rim: WheelArc, load_case: LoadCase) -> WheelArc:
         layer = self.scaled(self.layer, load_case)
         radius, shear_radius = rim.radius + layer, rim.shear_radius + layer
-        entry = entry_angle(rim.sinkage, radius)
-        share = entry / rim.entry
-        return replace(
-            rim,
-            entry=entry,
-            peak=rim.peak * share,
-            exit=rim.exit * share,
+        return rim.with_entry(
+            entry_angle(rim.sinkage, radius),
             radius=radius,
             shear_radius=shear_radius,
             lever=rim.lever + layer,

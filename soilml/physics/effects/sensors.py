@@ -22,15 +22,17 @@ E = TypeVar("E", bound=Effect)
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 def _linear_error(
-    name: str, what: str, size: float, calibration: float, signs: dict[str, int], isolate: str
+    name: str, size: float, calibration: float, signs: dict[str, int], isolate: str
 ) -> Callable[[type[E]], type[E]]:
     """Declare a gain or an offset of a sensor: an error of first order."""
+    of, form = name.split("-")
+    sensor = "load cell" if of == "load" else f"{of} sensor"
     return effect(
         name,
-        text=f"the {what} is off",
+        text=f"the {sensor}'s {'scale' if form == 'gain' else 'zero'} is off",
         source="linear sensor error",
         kind="sensor",
-        reference={"gain" if what.endswith("scale") else "offset": size},
+        reference={form: size},
         signs=signs,
         isolate=isolate,
         calibration=calibration,
@@ -80,12 +82,7 @@ class _ChannelOffset(Effect):
 
 
 @_linear_error(
-    "torque-offset",
-    "torque sensor's zero",
-    0.1,
-    0.05,
-    {"torque": +1},
-    "the wheel lifted; runs driven both ways",
+    "torque-offset", 0.1, 0.05, {"torque": +1}, "the wheel lifted; runs driven both ways"
 )
 class TorqueOffset(_ChannelOffset):
     r"""The torque sensor does not read zero when nothing turns it.
@@ -100,14 +97,7 @@ class TorqueOffset(_ChannelOffset):
     offset: Annotated[Real, Parameter("N m", -100.0, 100.0, "T0, reading at no torque")] = 0.0
 
 
-@_linear_error(
-    "torque-gain",
-    "torque sensor's scale",
-    0.03,
-    0.03,
-    {"torque": +1},
-    "a dead weight on a known lever",
-)
+@_linear_error("torque-gain", 0.03, 0.03, {"torque": +1}, "a dead weight on a known lever")
 class TorqueGain(_ChannelGain):
     r"""The torque sensor reads a share too much, or too little.
 
@@ -120,14 +110,7 @@ class TorqueGain(_ChannelGain):
     channel = "torque"
 
 
-@_linear_error(
-    "drawbar-offset",
-    "drawbar sensor's zero",
-    0.5,
-    0.5,
-    {"drawbar_pull": +1},
-    "the wheel lifted; runs both ways",
-)
+@_linear_error("drawbar-offset", 0.5, 0.5, {"drawbar_pull": +1}, "the wheel lifted; runs both ways")
 class DrawbarOffset(_ChannelOffset):
     r"""The drawbar sensor does not read zero when nothing pulls.
 
@@ -141,14 +124,7 @@ class DrawbarOffset(_ChannelOffset):
     offset: Annotated[Real, Parameter("N", -200.0, 200.0, "F0, reading at no pull")] = 0.0
 
 
-@_linear_error(
-    "drawbar-gain",
-    "drawbar sensor's scale",
-    0.03,
-    0.03,
-    {},
-    "a dead weight on the drawbar over a pulley",
-)
+@_linear_error("drawbar-gain", 0.03, 0.03, {}, "a dead weight on the drawbar over a pulley")
 class DrawbarGain(_ChannelGain):
     r"""The drawbar sensor reads a share too much, or too little.
 
@@ -161,12 +137,7 @@ class DrawbarGain(_ChannelGain):
 
 
 @_linear_error(
-    "sinkage-offset",
-    "sinkage sensor's zero",
-    0.001,
-    0.0005,
-    {"sinkage": +1},
-    "the wheel on a plate at soil level",
+    "sinkage-offset", 0.001, 0.0005, {"sinkage": +1}, "the wheel on a plate at soil level"
 )
 class SinkageOffset(_ChannelOffset):
     r"""The sinkage is measured from a level that is not that of the soil.
@@ -181,14 +152,7 @@ class SinkageOffset(_ChannelOffset):
     offset: Annotated[Real, Parameter("m", -0.1, 0.1, "z0, reading at no sinkage")] = 0.0
 
 
-@_linear_error(
-    "sinkage-gain",
-    "sinkage sensor's scale",
-    0.03,
-    0.03,
-    {"sinkage": +1},
-    "blocks of known height",
-)
+@_linear_error("sinkage-gain", 0.03, 0.03, {"sinkage": +1}, "blocks of known height")
 class SinkageGain(_ChannelGain):
     r"""The sinkage sensor reads a share too much, or too little.
 
@@ -202,12 +166,7 @@ class SinkageGain(_ChannelGain):
 
 
 @_linear_error(
-    "load-gain",
-    "load cell's scale",
-    0.03,
-    0.03,
-    {"torque": -1, "sinkage": -1},
-    "weighing the wheel on its stand",
+    "load-gain", 0.03, 0.03, {"torque": -1, "sinkage": -1}, "weighing the wheel on its stand"
 )
 class LoadGain(Effect):
     r"""The load cell reads a share too much: the wheel feels less than is reported.

@@ -9,10 +9,10 @@ from typing import Annotated, Any, ClassVar, NoReturn, final
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Array, Floats, Real
+from soilml.arrays import Floats, Real
 from soilml.errors import InputError
 from soilml.parameters import Parameter
-from soilml.physics.contact import Contact, Force, Resolution
+from soilml.physics.contact import Force
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from soilml.row_status import Status
@@ -30,18 +30,12 @@ class EmulatedGear:
 
     It has no contact and no stress, so that effects act on what goes in and what comes out alone.
 
-    Attributes
-    ----------
-    radius, width
-        Of the wheel that was simulated, m.
-    inputs
-        `slip`, `load`, and parameters of the soil: those that the runs differ in.
-    lower, upper, logarithmic
-        Ends of the design, and whether an input counts by its logarithm, (d,) each.
-    channels
-        `torque`, `drawbar_pull`, `sinkage`, as far as the runs have them.
-    emulate
-        Channels (m, k) at points (m, d) of the unit cube.
+    radius, width: Of the wheel that was simulated, m.
+    inputs: `slip`, `load`, and parameters of the soil: those that the runs differ in.
+    lower, upper, logarithmic: Ends of the design, and whether an input counts by its logarithm,
+        (d,) each.
+    channels: `torque`, `drawbar_pull`, `sinkage`, as far as the runs have them.
+    emulate: Channels (m, k) at points (m, d) of the unit cube.
     """
 
     name: ClassVar[str] = "simulator"
@@ -112,30 +106,11 @@ class EmulatedGear:
         """The radius (m): deeper wheels roll no more."""
         return self.radius
 
-    def initial_sinkage(self, soil: Soil, at: Operating) -> Array:
-        """Refused: a simulator has no contact."""
-        self._refuse()
-
-    def contact_geometry(self, sinkage: Array, soil: Soil, at: Operating) -> Any:
-        """Refused: a simulator has no contact."""
-        self._refuse()
-
-    def geometry_status(self, geometry: Any) -> Array:
-        """Refused: a simulator has no contact."""
-        self._refuse()
-
-    def contact(
-        self, geometry: Any, at: Operating, resolution: Resolution = Resolution.FULL
-    ) -> Contact:
-        """Refused: a simulator has no contact."""
-        self._refuse()
-
-    def profile_contact(self, geometry: Any, at: Operating, points: int) -> tuple[Array, Contact]:
-        """Refused: a simulator has no contact."""
-        self._refuse()
-
-    def _refuse(self) -> NoReturn:
+    def _refuse(self, *given: Any, **named: Any) -> NoReturn:
+        """Refuse what asks for a contact, which a simulator has not."""
         raise InputError(
             "a simulator gives forces alone, and this asks for the contact of its wheel; take a "
             "model file without [simulator]"
         )
+
+    initial_sinkage = contact_geometry = geometry_status = contact = profile_contact = _refuse

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 from soilml.arrays import Array, namespace
-from soilml.numerics.quadrature import columns, crowded_ends
+from soilml.numerics.quadrature import between
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
 from soilml.physics.gears.rigid_wheel import (
     BrakingLaw,
@@ -24,16 +22,12 @@ def flat_rim_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) 
 
     Parts end at the chord, where pressure begins to fall, and where shear displacement reverses.
     """
-    x, weight = columns(crowded_ends(count), rim.entry)
-    parts = list(pairwise(_part_ends(rim, at, law)))
-    xp = namespace(rim.entry)
-    angle = xp.concat([low + (high - low) * x for low, high in parts], axis=0)
-    arc = xp.concat([(high - low) * weight for low, high in parts], axis=0)
+    angle, arc = between(rim.exit, _part_ends(rim, at, law), rim.entry, count)
     return flat_rim_points(rim, at, law, angle, arc)
 
 
 def _part_ends(rim: WheelArc, at: Operating, law: BrakingLaw) -> list[Array]:
-    """Angles (rad) from exit to entry between which all that is integrated is smooth, (batch,)."""
+    """Angles (rad) within the contact between which all is smooth that is integrated, (batch,)."""
     xp = namespace(rim.entry)
     chord = rim.chord + 0.0 * rim.entry
     fall = (rim.entry - chord) / (rim.entry - rim.peak)
@@ -52,8 +46,7 @@ def _part_ends(rim: WheelArc, at: Operating, law: BrakingLaw) -> list[Array]:
         on_chord = xp.atan((edge - sheared / rate) / xp.cos(chord))
         reversal = xp.where(exists[0, :], on_arc[0, :], on_chord)
         inner.append(xp.minimum(xp.maximum(reversal, rim.exit), rim.entry))
-    ordered = xp.sort(xp.stack(inner, axis=0), axis=0)
-    return [rim.exit, *(ordered[i, :] for i in range(len(inner))), rim.entry]
+    return inner
 
 
 def flat_rim_points(

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, final, get_args
 from soilml.arrays import Array, Real, namespace
 from soilml.errors import InputError
 from soilml.parameters import Parameter
-from soilml.physics.contact import Contact
+from soilml.physics.contact import SMALLEST_DEPTH, Contact
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from soilml.row_status import Status
@@ -151,9 +151,63 @@ class WheelArc:
     chord: Array | None = None  # rad, half angle of the part that lies flat; None: a full circle
     tilt: Array | None = None  # m, half the difference in depth of two slices; None: upright
 
+    def with_entry(self, entry: Array, **changes: Any) -> WheelArc:
+        """The arc with another entry angle, of which the other angles keep their share."""
+        share = entry / self.entry
+        angles = {"peak": self.peak * share, "exit": self.exit * share}
+        return replace(self, entry=entry, **angles | changes)
+
     def travelled(self, slip: Array, law: BrakingLaw) -> Array:
         """Travel of the axle over that of the shearing surface, of slip ratios (batch,)."""
         return (1.0 - displacement_slip(slip, law)) * self.travel
+
+
+def depth_at(rim: WheelArc, passed: Array) -> Array:
+    """Depth (m) below the free surface of points of the rim, by the angle passed since entry."""
+    xp = namespace(passed)
+    # r (cos(theta) - cos(theta_1)), as in `differences_from_entry`
+    t = xp.tan(0.5 * passed)
+    u = 2.0 * t / (1.0 + t * t)
+    return rim.radius * u * (xp.sin(rim.entry) - t * xp.cos(rim.entry))
+
+
+def pressed_depth(rim: WheelArc, angle: Array) -> Array:
+    """Depth (m) that sets the pressure at angles (rad): behind the maximum, that before it.
+
+    The mirrored angle is at the same fraction of the way from the entry to the maximum.
+    """
+    xp = namespace(angle)
+    mirrored = (angle - rim.exit) * ((rim.entry - rim.peak) / (rim.peak - rim.exit))
+    depth = depth_at(rim, xp.where(angle < rim.peak, mirrored, rim.entry - angle))
+    return xp.maximum(depth, xp.full_like(depth, SMALLEST_DEPTH))
+
+
+def contact_at(
+    rim: WheelArc, at: Operating, passed: Array, depth: Array, arc: Array, law: BrakingLaw
+) -> Contact:
+    """Contact at points given by the angle passed since entry (rad); all arrays (points, batch).
+
+    `depth` (m) sets the pressure, `arc` (rad) is the angle that a point represents.
+    """
+    xp = namespace(passed)
+    sin_entry, cos_entry = xp.sin(rim.entry), xp.cos(rim.entry)
+    sin_difference, cos_difference = differences_from_entry(sin_entry, cos_entry, passed)
+    travelled = rim.travelled(at.slip, law)
+    displacement = rim.shear_radius * (passed - travelled * sin_difference)
+    area = rim.radius * rim.width * arc
+    return Contact(
+        depth=depth,
+        shear_displacement=displacement,
+        surface_travel=rim.shear_radius * passed,
+        area=area,
+        horizontal_area=area * (cos_entry + cos_difference),
+        frontal_area=area * (sin_entry - sin_difference),
+        shear_lever_arm=rim.lever,
+        width=rim.width,
+        shear_direction=displacement_direction(displacement, at.slip, law),
+        travel_ratio=travelled,
+        geometry=rim,
+    )
 
 
 def way_to_peak(contact: Contact) -> Array:
@@ -279,10 +333,9 @@ def sliced_contact(rim: WheelArc, contact_of: Callable[[WheelArc], Contact]) -> 
     for name in ("shear_lever_arm", "normal_lever_arm", "shear_direction"):
         if getattr(getattr(parts[0], name), "ndim", 0) > 1:
             fields[name] = joined([getattr(part, name) for part in parts])
-    return replace(parts[0], **fields, repeats=1, geometry=replace(rim, **angles))
+    return replace(parts[0], **fields, geometry=replace(rim, **angles))
 
 
 def _at_depth(rim: WheelArc, depth: Array) -> WheelArc:
     share = entry_angle(depth, rim.radius) / entry_angle(rim.sinkage, rim.radius)
-    angles = {name: getattr(rim, name) * share for name in _ANGLES}
-    return replace(rim, **angles, sinkage=depth, tilt=None)
+    return rim.with_entry(rim.entry * share, sinkage=depth, tilt=None)

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
-from soilml.numerics.quadrature import columns, crowded_ends, crowded_start
-from soilml.physics.contact import SMALLEST_DEPTH, Contact, Resolution
+from soilml.numerics.quadrature import between, columns, crowded_start
+from soilml.physics.contact import Contact, Resolution
 from soilml.physics.gears.flat_rim import flat_rim_contact, flat_rim_points
 from soilml.physics.gears.rigid_wheel import (
     BrakingLaw,
     RigidWheel,
     WheelArc,
-    differences_from_entry,
-    displacement_direction,
+    contact_at,
+    depth_at,
+    pressed_depth,
     reversals,
     sliced_contact,
 )
@@ -98,14 +99,11 @@ class Wheel(RigidWheel):
             angle = geometry.entry - fraction * arc
             none = xp.zeros_like(angle)
             return angle, flat_rim_points(geometry, at, self.braking, angle, none)
-        front, rear = geometry.entry - geometry.peak, geometry.peak - geometry.exit
         passed = fraction * arc
-        mirrored = (1.0 - fraction) * arc * (front / rear)
-        depth = depth_at(geometry, xp.where(passed <= front, passed, mirrored))
+        angle = geometry.entry - passed
+        depth = pressed_depth(geometry, angle)
         none = xp.zeros_like(passed)
-        depth = xp.maximum(depth, none + SMALLEST_DEPTH)
-        contact = contact_at(geometry, at, passed, depth, none, self.braking)
-        return geometry.entry - passed, contact
+        return angle, contact_at(geometry, at, passed, depth, none, self.braking)
 
 
 def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) -> Contact:
@@ -120,38 +118,21 @@ def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int)
     depth = depth_at(rim, before)
     passed = xp.concat([before, (front + rear) - x * rear], axis=0)
     arc = xp.concat([weight * front, weight * rear], axis=0)
-    found = contact_at(rim, at, passed, xp.concat([depth, depth], axis=0), arc, law)
-    return replace(found, repeats=2)
+    return contact_at(rim, at, passed, xp.concat([depth, depth], axis=0), arc, law)
 
 
 def _braking_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) -> Contact:
-    """Parts that end where shear displacement changes its direction and the shear curve bends.
-
-    Points are measured backward from the entry. The pressure behind the maximum is that at the
-    mirrored angle before it.
-    """
-    xp = namespace(rim.entry)
-    x, weight = columns(crowded_ends(count), rim.entry)
-    ends = xp.stack(_braking_part_ends(rim, 1.0 - rim.travelled(at.slip, law)), axis=0)
-    low, length = ends[:-1, None, :], (ends[1:, :] - ends[:-1, :])[:, None, :]  # (parts, 1, batch)
-    mirrored = (low - rim.exit + (1.0 - x) * length) * (
-        (rim.entry - rim.peak) / (rim.peak - rim.exit)
-    )
-    passed = rim.entry - (low + length) + x * length
-    depth = depth_at(rim, xp.where(low < rim.peak, mirrored, passed))
-
-    def points(value: Array) -> Array:
-        return xp.reshape(value, (length.shape[0] * count, -1))
-
-    depth = points(xp.maximum(depth, xp.full_like(depth, SMALLEST_DEPTH)))
-    return contact_at(rim, at, points(passed), depth, points(weight * length), law)
+    """Parts that end where shear displacement changes its direction and the shear curve bends."""
+    inner = _braking_part_ends(rim, 1.0 - rim.travelled(at.slip, law))
+    angle, arc = between(rim.exit, inner, rim.entry, count)
+    return contact_at(rim, at, rim.entry - angle, pressed_depth(rim, angle), arc, law)
 
 
 def _braking_part_ends(rim: WheelArc, slip: Array) -> list[Array]:
-    """Angles (rad) from exit to entry that bound the parts of a braking wheel's contact.
+    """Angles (rad) between exit and entry that bound the parts of a braking wheel's contact.
 
-    Between exit and entry they are the maximum stress and the reversal of shear displacement; a
-    second reversal is added if any row has one, where the rim reaches far behind the axle. Rows
+    They are the maximum stress and the reversal of shear displacement; a second
+    reversal is added if any row has one, where the rim reaches far behind the axle. Rows
     without a reversal take an angle that divides the longer part, or the lowest, in halves, or one
     close to the entry where the wheel is nearly locked. `slip` is that of the shear displacement.
     """
@@ -166,42 +147,4 @@ def _braking_part_ends(rim: WheelArc, slip: Array) -> list[Array]:
     if bool(xp.any(exists[1, :])):
         below = 0.5 * (rim.exit + xp.minimum(*inner))
         inner.append(xp.where(exists[1, :], reversal[1, :], below))
-    ordered = xp.sort(xp.stack(inner, axis=0), axis=0)
-    return [rim.exit, *(ordered[i, :] for i in range(len(inner))), rim.entry]
-
-
-def depth_at(rim: WheelArc, passed: Array) -> Array:
-    """Depth (m) below the free surface of points of the rim, by the angle passed since entry."""
-    xp = namespace(passed)
-    # r (cos(theta) - cos(theta_1)), as in `differences_from_entry`
-    t = xp.tan(0.5 * passed)
-    u = 2.0 * t / (1.0 + t * t)
-    return rim.radius * u * (xp.sin(rim.entry) - t * xp.cos(rim.entry))
-
-
-def contact_at(
-    rim: WheelArc, at: Operating, passed: Array, depth: Array, arc: Array, law: BrakingLaw
-) -> Contact:
-    """Contact at points given by the angle passed since entry (rad); all arrays (points, batch).
-
-    `depth` (m) sets the pressure, `arc` (rad) is the angle that a point represents.
-    """
-    xp = namespace(passed)
-    sin_entry, cos_entry = xp.sin(rim.entry), xp.cos(rim.entry)
-    sin_difference, cos_difference = differences_from_entry(sin_entry, cos_entry, passed)
-    travelled = rim.travelled(at.slip, law)
-    displacement = rim.shear_radius * (passed - travelled * sin_difference)
-    area = rim.radius * rim.width * arc
-    return Contact(
-        depth=depth,
-        shear_displacement=displacement,
-        surface_travel=rim.shear_radius * passed,
-        area=area,
-        horizontal_area=area * (cos_entry + cos_difference),
-        frontal_area=area * (sin_entry - sin_difference),
-        shear_lever_arm=rim.lever,
-        width=rim.width,
-        shear_direction=displacement_direction(displacement, at.slip, law),
-        travel_ratio=travelled,
-        geometry=rim,
-    )
+    return inner

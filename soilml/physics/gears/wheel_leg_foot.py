@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Array, Real, namespace
-from soilml.numerics.quadrature import columns, crowded_ends
+from soilml.numerics.quadrature import between
 from soilml.parameters import Parameter
-from soilml.physics.contact import SMALLEST_DEPTH, Contact, Resolution
-from soilml.physics.gears.rigid_wheel import differences_from_entry, entry_angle, reversals
+from soilml.physics.contact import Contact, Resolution
+from soilml.physics.gears.rigid_wheel import (
+    WheelArc,
+    contact_at,
+    entry_angle,
+    pressed_depth,
+    reversals,
+)
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from soilml.row_status import Status
@@ -152,35 +157,25 @@ def _sole_contact(sole: Sole, at: Operating, count: int) -> Contact:
         reversal, exists = reversals(sole.entry, heel, at.slip)
         first = xp.where(exists[0, :], reversal[0, :], 0.5 * sole.top)
         inner.append(xp.minimum(first, sole.top))
-    ordered = xp.sort(xp.stack(inner, axis=0), axis=0)
-    ends = [heel, *(ordered[i, :] for i in range(len(inner))), sole.top]
-    x, weight = columns(crowded_ends(count), heel)
-    angle = xp.concat([low + (high - low) * x for low, high in pairwise(ends)], axis=0)
-    arc = xp.concat([(high - low) * weight for low, high in pairwise(ends)], axis=0)
-    return _contact_at(sole, at, angle, arc)
+    return _contact_at(sole, at, *between(heel, inner, sole.top, count))
 
 
 def _contact_at(sole: Sole, at: Operating, angle: Array, arc: Array) -> Contact:
     """Contact at these angles (rad), each representing `arc` (rad); arrays (points, batch)."""
     xp = namespace(angle)
-    sin_entry, cos_entry = xp.sin(sole.entry), xp.cos(sole.entry)
-    passed = sole.entry - angle
-    # behind the maximum, the angle before it that has the same pressure
-    mirrored = angle * ((sole.entry - sole.peak) / sole.peak)
-    # depth R (cos(theta) - cos(theta_1)), as in `differences_from_entry`
-    t = xp.tan(0.5 * xp.where(angle < sole.peak, mirrored, passed))
-    depth = 2.0 * sole.radius * t / (1.0 + t * t) * (sin_entry - t * cos_entry)
-    sin_difference, cos_difference = differences_from_entry(sin_entry, cos_entry, passed)
-    sin, cos = sin_entry - sin_difference, cos_entry + cos_difference
-    area = sole.radius * sole.width * arc
-    return Contact(
-        depth=xp.maximum(depth, xp.zeros_like(depth) + SMALLEST_DEPTH),
-        shear_displacement=sole.radius * (passed - (1.0 - at.slip) * sin_difference),
-        surface_travel=sole.radius * passed,
-        area=area,
-        horizontal_area=area * cos,
-        frontal_area=area * sin,
-        shear_lever_arm=sole.radius + sole.hub_offset * cos,
-        normal_lever_arm=-sole.hub_offset * sin,
+    circle = WheelArc(
+        entry=sole.entry,
+        exit=xp.zeros_like(sole.entry),
+        peak=sole.peak,
+        sinkage=sole.sinkage,
+        radius=sole.radius,
+        shear_radius=sole.radius,
+        lever=sole.radius,
         width=sole.width,
+    )
+    depth = pressed_depth(circle, angle)
+    return replace(
+        contact_at(circle, at, sole.entry - angle, depth, arc, "slip-sign"),
+        shear_lever_arm=sole.radius + sole.hub_offset * xp.cos(angle),
+        normal_lever_arm=-sole.hub_offset * xp.sin(angle),
     )

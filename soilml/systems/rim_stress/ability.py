@@ -9,8 +9,13 @@ import numpy as np
 
 from soilml.arrays import Floats, Real
 from soilml.errors import FitError
-from soilml.systems.rim_stress.climbs import Rover, WheelRun, count_apart, wheel_components
-from soilml.systems.rim_stress.force_balance import SlopePull
+from soilml.systems.rim_stress.climbs import (
+    Rover,
+    WheelRun,
+    count_apart,
+    pull_of_rover,
+    wheel_components,
+)
 from soilml.systems.rim_stress.ground import GroundEstimate
 from soilml.systems.rim_stress.stress import StressProfile
 
@@ -242,32 +247,11 @@ def pull_and_slope_at(
     shear: Sequence[Real] | Floats,
     front_share: Real,
 ) -> tuple[Real, Real]:
-    r"""Pull on level ground (N) and slope climbed (rad) of a rover whose wheels have one slip.
+    """Pull on level ground (N) and slope climbed (rad) of a rover whose wheels have one slip.
 
     profiles: Of front and rear. shear: Cohesion (Pa), friction angle (rad) and k_x (m), (n,) each.
-
-    Each wheel's ratio of pull to load on soil without cohesion is :math:`\rho`, the loads are
-    :math:`a \cos\alpha - h \sin\alpha` and :math:`(1 - a) \cos\alpha + h \sin\alpha` times the
-    weight, and M of each wheel follows from its load:
-
-    .. math::
-        F_x = m g [(a \rho_f + (1 - a) \rho_r) \cos\alpha + h (\rho_r - \rho_f) \sin\alpha]
-              + 2 c \sum (C_x - \rho C_z)
     """
     cohesion, friction, modulus = shear
-    front, rear = (
-        SlopePull.of_wheel(
-            wheel_components(WheelRun(slip, profile), rover, modulus),
-            rover.weight,
-            cohesion,
-            np.tan(friction),
-        )
-        for profile in profiles
-    )
-    forces = SlopePull(
-        weight=rover.weight,
-        cos_term=front_share * front.cos_term + (1.0 - front_share) * rear.cos_term,
-        sin_term=rover.height_ratio * (rear.cos_term - front.cos_term),
-        constant=2.0 * (front.constant + rear.constant),
-    )
+    wheels = [wheel_components(WheelRun(slip, profile), rover, modulus) for profile in profiles]
+    forces = pull_of_rover(rover, wheels, cohesion, np.tan(friction), front_share)
     return forces.pull(0.0), forces.equilibrium_slope()

@@ -18,11 +18,9 @@ from soilml.io.toml_settings import read_settings
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter
 from soilml.systems.rim_stress.force_balance import (
-    LIFT,
-    PULL,
+    SlopePull,
     find_modulus,
     force_components,
-    force_of,
     magnification,
     pull_ratio,
 )
@@ -198,18 +196,34 @@ def wheel_components(wheel: WheelRun, rover: Rover, modulus: Real) -> Floats:
 
 
 def pull_of_rover(
-    rover: Rover, slope: Real, wheels: Sequence[Floats], cohesion: Real, tangent: Real
-) -> Real:
-    r"""Drawbar pull 2 (F_xf + F_xr) (N) of a rover whose wheels carry its weight on the slope.
+    rover: Rover,
+    wheels: Sequence[Floats],
+    cohesion: Real,
+    tangent: Real,
+    front_share: Real | None = None,
+) -> SlopePull:
+    r"""Drawbar pull 2 (F_xf + F_xr) of a rover whose wheels carry its weight, by the slope.
 
-    The load of each wheel, which sum to :math:`m g \cos\alpha`, gives its magnification. `wheels`
-    are the components of front and rear. References: Nagatani et al., eqs. 6, 7, 10 and 11.
+    Each wheel's ratio of pull to load on soil without cohesion is :math:`\rho`, the loads are
+    :math:`a \cos\alpha - h \sin\alpha` and :math:`(1 - a) \cos\alpha + h \sin\alpha` times the
+    weight, and M of each wheel follows from its load:
+
+    .. math::
+        F_x = m g [(a \rho_f + (1 - a) \rho_r) \cos\alpha + h (\rho_r - \rho_f) \sin\alpha]
+              + 2 c \sum (C_x - \rho C_z)
+
+    wheels: The components of front and rear. front_share: Other than that of the rover.
+
+    References: Nagatani et al., eqs. 6, 7, 10 and 11.
     """
-    pulls = [
-        force_of(parts, PULL, magnification(parts, load, cohesion, tangent), cohesion, tangent)
-        for parts, load in zip(wheels, rover.loads(slope), strict=True)
-    ]
-    return 2.0 * sum(pulls)
+    share = rover.front_share if front_share is None else front_share
+    front, rear = (SlopePull.of_wheel(own, rover.weight, cohesion, tangent) for own in wheels)
+    return SlopePull(
+        weight=rover.weight,
+        cos_term=share * front.cos_term + (1.0 - share) * rear.cos_term,
+        sin_term=rover.height_ratio * (rear.cos_term - front.cos_term),
+        constant=2.0 * (front.constant + rear.constant),
+    )
 
 
 @dataclass(frozen=True)
@@ -242,7 +256,7 @@ class ForceBalances:
         share = position - knot
         wheels = [v[..., knot] * (1.0 - share) + v[..., knot + 1] * share for v in self.wheels]
         slope = np.asarray([climb.slope for climb in self.climbs])[:, None]
-        pull = pull_of_rover(self.rover, slope, wheels, cohesion, np.tan(friction))
+        pull = pull_of_rover(self.rover, wheels, cohesion, np.tan(friction)).pull(slope)
         return np.asarray(pull - self.rover.weight * np.sin(slope)).T
 
     def whitener(self, shear: ShearParameters, noise: Uncertainty) -> tuple[Floats, Floats]:
@@ -266,31 +280,30 @@ def balance_std(
     `shear`: the effective variance of the balance. References: Orear, Am. J. Phys. 50(10), 1982.
     """
     cohesion, tangent, modulus = shear[0], float(np.tan(shear[1])), shear[2]
-    soil = cohesion, tangent
+    a = rover.front_share
 
-    def residual(wheels: Sequence[WheelRun], slope: float = climb.slope) -> float:
+    def residual(
+        wheels: Sequence[WheelRun] = climb.wheels, slope: float = climb.slope, share: float = a
+    ) -> float:
         parts = [wheel_components(wheel, rover, modulus) for wheel in wheels]
-        return float(pull_of_rover(rover, slope, parts, *soil) - rover.weight * np.sin(slope))
+        pull = pull_of_rover(rover, parts, cohesion, tangent, share).pull(slope)
+        return float(pull - rover.weight * np.sin(slope))
 
-    here = residual(climb.wheels)
     # a speed read too high gives slips that are too low
     faster = [replace(w, slip=1.0 - (1.0 - w.slip) * (1.0 + STEP)) for w in climb.wheels]
-    by_speed = (residual(faster) - here) / STEP
-    by_entry = (residual([wheel.with_entry(STEP) for wheel in climb.wheels]) - here) / STEP
-    by_slope = (residual(climb.wheels, climb.slope + STEP) - here) / STEP
+    ahead = [wheel.with_entry(STEP) for wheel in climb.wheels]
+    moved = [residual(faster), residual(ahead), residual(slope=climb.slope + STEP)]
+    moved.append(residual(share=a * (1.0 + STEP)))
+    by_speed, by_entry, by_slope, by_share = (np.asarray(moved) - residual()) / STEP
     independent = [noise.speed_m_s.share * by_speed, noise.slope_rad * by_slope]
-    # load moved between the axles, and noise of the stress: at a given load more stress at one
-    # angle means less elsewhere, and counts by the difference of ratios of pull to load
-    each = [wheel_components(wheel, rover, modulus) for wheel in climb.wheels]
-    scales = [
-        float(magnification(parts, load, *soil))
-        for parts, load in zip(each, rover.loads(climb.slope), strict=True)
-    ]
-    ratios = [float(pull_ratio(parts, tangent)) for parts in each]
-    on_front = float(force_of(each[0], LIFT, scales[0], *soil))
-    independent.append(2.0 * noise.front_load * on_front * (ratios[0] - ratios[1]))
-    for wheel, scale, ratio in zip(climb.wheels, scales, ratios, strict=True):
+    independent.append(noise.front_load * by_share)
+    # at a given load more stress at one angle means less elsewhere, and counts by the difference
+    # of ratios of pull to load
+    for wheel, load in zip(climb.wheels, rover.loads(climb.slope), strict=True):
+        parts = wheel_components(wheel, rover, modulus)
+        scale = float(magnification(parts, load, cohesion, tangent))
         pull, lift = _per_stress(wheel, rover, tangent, modulus)
+        ratio = float(pull_ratio(parts, tangent))
         by_stress = 2.0 * scale * (pull - ratio * lift) * wheel.normal_std
         independent.append(float(np.linalg.norm(by_stress)))
     std = float(np.linalg.norm(independent))
@@ -324,7 +337,7 @@ def modulus_per_climb(
 
         def pull(modulus: Floats, climb: Climb = climb) -> Floats:
             parts = [wheel_components(wheel, rover, modulus) for wheel in climb.wheels]
-            return np.asarray(pull_of_rover(rover, climb.slope, parts, cohesion, tangent))
+            return np.asarray(pull_of_rover(rover, parts, cohesion, tangent).pull(climb.slope))
 
         try:
             moduli.append(find_modulus(pull, float(rover.weight * np.sin(climb.slope))))

@@ -12,8 +12,7 @@ from soilml.arrays import Floats, Real
 from soilml.errors import FitError
 from soilml.parameters import Parameter, check
 from soilml.physics.contact import Stress, integrate
-from soilml.physics.gears.rigid_wheel import WheelArc
-from soilml.physics.gears.wheel import contact_at
+from soilml.physics.gears.rigid_wheel import WheelArc, contact_at
 from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.remarks import Remark
 from soilml.systems.rim_stress.stress import StressProfile

@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from soilml.log_import import import_log, init_map
+
 RADIUS, LOAD, RIM_SPEED = 0.15, 60.0, 0.05
 
 
@@ -111,3 +113,21 @@ def scores(imported, stages, truth, name):
         for i in np.flatnonzero(inside):
             found.append((table[name][i] - truth(slip)) / table[f"{name}_std"][i])
     return found
+
+
+#: The edit that gives a new map the radius of 0.15 m.
+RADIUS_EDIT = ('# radius = "0.15 m', 'radius = "0.15 m')
+
+
+def noisy(rng, values, std):
+    return values + std * rng.standard_normal(values.size)
+
+
+def imported(folder, logs, edits=()):
+    """The import of logs by a new map with these edits and no other, and the text of the map."""
+    text = init_map(logs)
+    for old, new in edits:
+        assert old in text, text
+        text = text.replace(old, new)
+    (folder / "map.toml").write_text(text, encoding="utf-8")
+    return import_log(logs, folder / "map.toml"), text

@@ -5,21 +5,13 @@ import datetime
 import numpy as np
 import pytest
 from foreign_rigs import RADIUS, RADIUS_EDIT, drive, law, noisy, table
+from simulated_rig import imported
 
 from soilml.errors import InputError
 from soilml.log_import import import_log, init_map
 from soilml.log_import.guesses.constants import stated_constants
 
 SLIPS = (0.1, 0.25, 0.45)
-
-
-def imported(folder, logs, edits=()):
-    text = init_map(logs)
-    for old, new in edits:
-        assert old in text, text
-        text = text.replace(old, new)
-    (folder / "map.toml").write_text(text, encoding="utf-8")
-    return import_log(logs, folder / "map.toml").table, text
 
 
 def check(rows, stages):
@@ -52,9 +44,9 @@ def test_millivolts_and_a_carriage_speed_of_the_head(tmp_path):
         stages += d.stages
     edits = [('scale = "1 N m"  # CHANGE: what 1 mV is', 'scale = "0.425 N m"  # '),
              ('scale = "1 N"  # CHANGE: what 1 V is', 'scale = "12.5 N"  # ')]  # fmt: skip
-    rows, text = imported(tmp_path, logs, edits)
+    found, text = imported(tmp_path, logs, edits)
     assert 'value = "20 mm/s +- 1 %"' in text
-    check(rows, stages)
+    check(found.table, stages)
 
 
 @pytest.mark.parametrize("label", ["{}", "wheel {}"])
@@ -75,10 +67,10 @@ def test_a_line_for_each_wheel(label, tmp_path):
     head = "timestamp,wheel_id,wheel_omega_rad_s,v_m_s,torque_Nm,Fz_N"
     path = tmp_path / "drive.csv"
     path.write_text("\n".join([head, *(line for _, line in sorted(lines))]))
-    rows, text = imported(tmp_path, path, [RADIUS_EDIT])
+    found, text = imported(tmp_path, path, [RADIUS_EDIT])
     assert 'column = "timestamp"' in text and 'column = "wheel_id"  # a line for each wheel' in text
-    assert {*rows["run"]} == {label.format(k) for k in range(3)}
-    check(rows, stages)
+    assert {*found.table["run"]} == {label.format(k) for k in range(3)}
+    check(found.table, stages)
 
 
 def test_slip_in_per_cent_that_counts_braking_up(tmp_path):
@@ -94,12 +86,12 @@ def test_slip_in_per_cent_that_counts_braking_up(tmp_path):
     lines += table((d.t, d.pull + 3.2, still, -d.load, 0.1 * still, -sign * d.torque, 0.1 * still,
                     -100 * sign * slip * (act > 0.1), 12.5 + 1000 * d.sinkage), ";")  # fmt: skip
     (tmp_path / "ft.csv").write_text("\n".join(lines))
-    rows, text = imported(tmp_path, tmp_path / "ft.csv")
+    found, text = imported(tmp_path, tmp_path / "ft.csv")
     slip_table = text.partition("[slip]")[2].partition("[torque]")[0]
     assert 'column = "i"' in slip_table and "reverse = true" in slip_table
     assert "it reads 3.2 before the wheel starts" in text  # by the torque, as no speed is known
     assert "it reads 16.5 mm before the wheel starts" in text
-    check(rows, [(0.4, 60), (0.25, 60), (-0.1, 60)])
+    check(found.table, [(0.4, 60), (0.25, 60), (-0.1, 60)])
 
 
 def test_stated_numbers_are_in_plain_digits(tmp_path):

@@ -57,7 +57,7 @@ def test_a_right_map_gets_no_hint(log):
     ("content", "cause"),
     [
         # what the log has in SI units is taken for another unit: the wrong number arrives
-        (changed("torque", unit="kN m"), "mN m and was read as N m"),
+        (changed("torque", unit="kN m"), "the torque is in N m and was read as kN m"),
         (changed("load", unit="N", reverse=True), "reverse = true in [load]"),
         (changed("wheel_speed", unit="turns/s"), "is in rad/s, and was read as turns/s"),
         (changed("wheel", radius=2 * RADIUS), "was the radius of 0.3 m measured as diameter?"),

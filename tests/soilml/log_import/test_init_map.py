@@ -8,32 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from simulated_rig import LOAD, RADIUS, drive, torque_law, write_csv
+from simulated_rig import LOAD, RADIUS, RADIUS_EDIT, drive, imported, noisy, torque_law, write_csv
 
 from soilml.cli import main
 from soilml.errors import InputError
 from soilml.io.read_table import read_table
 from soilml.log_import import import_log, init_map
-from soilml.log_import.new_map import draft_map
+from soilml.log_import.guesses.map_guess import draft_map
 
 SLIPS = (0.1, 0.3, 0.5)
-
-
-def noisy(rng, values, std):
-    return values + std * rng.standard_normal(values.size)
-
-
-def imported_by_guess(tmp_path, logs, edits=()):
-    """Import by the map of `init_map`, with these edits and no other."""
-    text = init_map(logs)
-    for old, new in edits:
-        assert old in text, text
-        text = text.replace(old, new)
-    (tmp_path / "map.toml").write_text(text)
-    return import_log(logs, tmp_path / "map.toml")
-
-
-RADIUS_EDIT = ('# radius = "0.15 m', 'radius = "0.15 m')
 
 
 def by_name(rng, d):
@@ -78,7 +61,7 @@ def test_guesses_give_the_truth(log, tmp_path):
         }
     path = write_csv(tmp_path / "log.csv", columns, separator, decimal, encoding, head, units)
     edits = [] if any("adius" in line for line in head) else [RADIUS_EDIT]
-    table = imported_by_guess(tmp_path, path, edits).table
+    table = imported(tmp_path, path, edits)[0].table
     np.testing.assert_allclose(table["slip"], SLIPS, atol=0.02)
     np.testing.assert_allclose(table["torque_Nm"], torque_law(SLIPS), rtol=0.08)
     np.testing.assert_allclose(table["load_N"], LOAD, rtol=0.02)
@@ -109,7 +92,7 @@ def test_wheels_are_told_apart_by_their_names(tmp_path):
     path = write_csv(tmp_path / "log.csv", columns)
     edits = [RADIUS_EDIT, ("# [vehicle] ", "[vehicle] "), ("# wheels =", "wheels ="),
              ('# mass = "6.1 kg +- 0.1 kg"', f"mass = {4 * LOAD / 9.80665}")]  # fmt: skip
-    table = imported_by_guess(tmp_path, path, edits).table
+    table = imported(tmp_path, path, edits)[0].table
     assert list(table["wheel"]) == ["front_left", "front_right", "rear_left", "rear_right"]
     np.testing.assert_allclose(table["load_N"], LOAD, rtol=1e-5)
 
@@ -127,7 +110,7 @@ def test_slip_and_load_in_the_names_of_files(tmp_path):
         d = drive(rng, slips=(slip / 100,))
         columns = {"Time (s)": d.time, "Torque (Nm)": noisy(rng, d.torque, 0.05)}
         logs.append(write_csv(tmp_path / f"slip{slip}_load60N_rep1.csv", columns))
-    table = imported_by_guess(tmp_path, logs).table
+    table = imported(tmp_path, logs)[0].table
     np.testing.assert_allclose(table["slip"], SLIPS)
     assert set(table["load_N"]) == {60.0}
     np.testing.assert_allclose(table["torque_Nm"], torque_law(SLIPS), rtol=0.08)
@@ -148,7 +131,7 @@ def test_several_runs_in_one_file(named, tmp_path):
         "Fz": np.concatenate([d.load for d in drives]),
     }
     path = write_csv(tmp_path / "all.csv", columns)
-    table = imported_by_guess(tmp_path, path, [RADIUS_EDIT]).table
+    table = imported(tmp_path, path, [RADIUS_EDIT])[0].table
     assert list(table["run"]) == (["T0", "T1", "T2"] if named else ["all_01", "all_02", "all_03"])
     np.testing.assert_allclose(table["slip"], SLIPS, atol=0.02)
 

@@ -2,30 +2,16 @@
 
 import numpy as np
 import pytest
-from simulated_rig import LOAD, RADIUS, drive, torque_law, write_csv
+from simulated_rig import LOAD, RADIUS, RADIUS_EDIT, drive, imported, torque_law, write_csv
 
 from soilml.cli import main
 from soilml.errors import InputError
 from soilml.io.text_tables import csv_text
-from soilml.log_import import import_log, init_map
+from soilml.log_import import init_map
 from soilml.log_import.checks.table_hints import table_hints
 from soilml.remarks import about, texts
 
 SLIPS = (0.1, 0.3, 0.5)
-RADIUS_EDIT = ('# radius = "0.15 m', 'radius = "0.15 m')
-
-
-def imported(folder, logs, edits=()):
-    text = init_map(logs)
-    for old, new in edits:
-        assert old in text, text
-        text = text.replace(old, new)
-    (folder / "map.toml").write_text(text)
-    return import_log(logs, folder / "map.toml"), text
-
-
-def noisy(rng, values, std):
-    return values + std * rng.standard_normal(values.size)
 
 
 def test_runs_that_a_pause_separates_and_forces_in_kg(tmp_path):

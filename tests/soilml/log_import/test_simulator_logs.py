@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from simulated_rig import imported
 
-from soilml.log_import import import_log, init_map
+from soilml.log_import import init_map
 from soilml.optional_imports import tomllib
 
 #: Slip by 1 - v/(r omega), torque, pull and sinkage of three stages of 20 s, and the load.
@@ -33,16 +34,6 @@ def write(path, columns):
     return path
 
 
-def imported(folder, log, *edits):
-    """The table of a log by a guessed map with these edits."""
-    text = init_map([log])
-    for old, new in edits:
-        assert old in text, text
-        text = text.replace(old, new)
-    (folder / "map.toml").write_text(text)
-    return import_log([log], folder / "map.toml").table
-
-
 def test_chrono_drawbar_pull_rig_without_a_header(tmp_path, samples):
     """DBP.dat of ChVehicleCosimWheeledMBSNode: two spaces, seven digits, no names."""
     s = samples
@@ -56,7 +47,7 @@ def test_chrono_drawbar_pull_rig_without_a_header(tmp_path, samples):
     assert not {"wheel_speed", "ground_speed"} & content.keys()
     assert content["drawbar_pull"] == {"column": "DBP", "unit": "N"}
     load = ("[windows]", '[load]\nvalue = "60 N"\n[windows]')
-    rows = imported(tmp_path, log, load)
+    rows = imported(tmp_path, [log], [load])[0].table
     assert rows["slip"] == pytest.approx([stage[0] for stage in STAGES], abs=0.005)
     assert rows["drawbar_pull_N"] == pytest.approx([stage[2] for stage in STAGES], rel=0.02)
     # the names are those of this file alone

@@ -2,22 +2,13 @@
 
 import numpy as np
 import pytest
-from simulated_rig import RADIUS, drive, torque_law, write_csv
+from simulated_rig import RADIUS, drive, imported, torque_law, write_csv
 
 from soilml.errors import InputError
 from soilml.log_import import import_log, init_map
 
 SLIPS = (0.1, 0.3, 0.5)
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
-
-
-def imported(tmp_path, logs, edits=()):
-    text = init_map(logs)
-    for old, new in edits:
-        assert old in text, text
-        text = text.replace(old, new)
-    (tmp_path / "map.toml").write_text(text)
-    return import_log(logs, tmp_path / "map.toml"), text
 
 
 def test_a_place_in_x_y_and_z_is_one_place(tmp_path):

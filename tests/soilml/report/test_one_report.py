@@ -149,6 +149,12 @@ def test_a_page_shows_parts_of_files_as_they_are():
     assert "<pre>[bias]\nslip = -0.01\n</pre>" in html and "<li>Slip is −1</li>" in html
 
 
+def test_a_command_in_a_sentence_is_code():
+    pytest.importorskip("matplotlib")
+    html = page(report(verdict="Run `soilml <gap>`."), ORIGIN)
+    assert ">Run <code>soilml &lt;gap&gt;</code>.</p>" in html
+
+
 def test_groups_of_rows_are_one_report():
     both = by_group({"a": report(), "b": report()}, {"c": "too few rows"}, "run", "2 results.", "t")
     heads, rows, _ = both.tables[0].cells()

@@ -67,6 +67,13 @@ def test_the_likelihood_is_the_average_over_scales(session, example):
     assert least[0] == pytest.approx(misfits[JUDGED], rel=1e-4)
 
 
+def test_a_model_without_errors_takes_the_shortcut_to_the_same_likelihood(session, example):
+    exact, nearly = (run(session, *example, size) for size in (0.0, 1e-5))
+    assert exact[0] == pytest.approx(nearly[0], rel=1e-5)
+    assert exact[1] == pytest.approx(nearly[1], rel=1e-5)
+    assert (exact[2] == 1.0).all()
+
+
 def test_common_errors_are_integrated_out_of_the_likelihood():
     rng = np.random.default_rng(0)
     a, g, b = rng.normal(size=(8, 5)), rng.normal(size=(8, 3)), rng.normal(size=5)
