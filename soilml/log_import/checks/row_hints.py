@@ -13,7 +13,8 @@ import numpy as np
 from soilml.log_import.checks.checked_rows import Hint, RowsToCheck
 from soilml.log_import.checks.slip_hints import definition_hints, rates_hints, slip_hints
 
-TRACTION = (0.02, 1.2)  # Range of T / (W r) of driving wheels on soil
+#: Range of T / (W r) of driving wheels on soil: the largest is of light wheels on cohesive snow.
+TRACTION = (0.02, 1.5)
 _USUAL_TRACTION = 0.3
 #: Largest pull over load, lever arm of torque over load, m, and sinkage, m, of any wheel.
 _MOST_PULL, _MOST_LEVER, _MOST_SINKAGE = 1.2, 0.8, 0.7
