@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import input_box, solved
-from reference import equilibrium, forces
+from reference import equilibrium, forces, row_of
 
 from soilml import LinearWheel, Model, Operating, Status, Wheel, soil
 from soilml.numerics.root_finding import rising_root
@@ -103,9 +103,7 @@ def test_each_law_agrees_with_adaptive_quadrature(case, law):
     model = Model(Wheel(radius=radius, width=width, braking=law))
     force = model(ground, Operating(slip=slip, load=load))
     assert force.status == Status.OK
-    row = {"radius": radius, "width": width, "slip": slip, "braking": law}
-    row |= {m: getattr(ground, m) for m in ("cohesion", "friction_angle", "shear_modulus")}
-    row |= {m: getattr(ground, m) for m in ("kc", "kphi", "n", "a0", "a1")}
+    row = row_of(ground, radius=radius, width=width, slip=slip, braking=law)
     carried, pull, torque = forces(float(force.entry_angle), row)
     assert carried == pytest.approx(load, rel=1e-7)
     assert force.torque == pytest.approx(torque, rel=1e-7, abs=1e-7 * load * radius)
