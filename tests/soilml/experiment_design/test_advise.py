@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from measured_rows import torque_rows
 
-from soilml import Operating, read_case
+from soilml import read_case
 from soilml.errors import FitError
 from soilml.experiment_design import (
     advise,
@@ -14,7 +15,6 @@ from soilml.experiment_design import (
 )
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.usable_readings import usable_readings
-from soilml.io.table import Table
 
 SOIL = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
 GRID = candidate_grid([0.05, 0.2, 0.6], [30.0, 60.0, 120.0])
@@ -27,12 +27,7 @@ def case(model_file):
 
 def after(case, slip, load, **options):
     """Advice after rows driven so on SOIL without noise."""
-    true = case.with_values(SOIL)
-    at = Operating(slip=np.asarray(slip), load=np.asarray(load))
-    torque = true.model(true.soil, at).torque
-    run = np.full(len(slip), "a")
-    table = Table({"run": run, "slip": at.slip, "load_N": at.load, "torque_Nm": torque})
-    data = usable_readings(case, table)
+    data = usable_readings(case, torque_rows(case, SOIL, slip, load))
     samples = samples_of_rows(case, data, select_free(case, None), 1024, exact_model=True)
     return advise(case, samples, GRID, measured=data.at, outcome_count=200, **options)
 
@@ -60,11 +55,8 @@ def test_the_realised_width_after_a_plan_is_the_expected_one(case):
     rng, free, left = np.random.default_rng(4), select_free(case, None), []
     slip, load = np.asarray(points).T
     for _ in range(16):
-        true = case.with_values({f.path: float(f.prior.at(rng.random())) for f in free})
-        torque = true.model(true.soil, Operating(slip=slip, load=load)).torque
-        torque = torque * (1.0 + 0.02 * rng.standard_normal(2))
-        run = np.asarray(["a", "a"])
-        table = Table({"run": run, "slip": slip, "load_N": load, "torque_Nm": torque})
+        true = {f.path: float(f.prior.at(rng.random())) for f in free}
+        table = torque_rows(case, true, slip, load, noise=0.02, seed=rng)
         found = samples_of_rows(case, usable_readings(case, table), free, exact_model=True)
         left.append(found.remaining_fraction)
     realised = np.sqrt(np.mean(np.square(left), axis=0))

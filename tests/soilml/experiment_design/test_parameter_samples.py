@@ -2,24 +2,18 @@
 
 import numpy as np
 import pytest
+from measured_rows import torque_rows
 
-from soilml import Operating, identify, read_case
+from soilml import identify, read_case
 from soilml.experiment_design import samples_of_moments, samples_of_rows
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.usable_readings import usable_readings
-from soilml.io.table import Table
-
-
-def rows(case, slip, load):
-    force = case.model(case.soil, Operating(slip=slip, load=load))
-    run = np.full(len(slip), "a")
-    return Table({"run": run, "slip": slip, "load_N": load, "torque_Nm": force.torque})
 
 
 @pytest.mark.slow
 def test_samples_of_rows_are_as_wide_and_as_correlated_as_the_posterior(model_file):
     case = read_case(model_file)
-    table = rows(case, np.asarray([0.1, 0.5, 0.5]), np.asarray([60.0, 60.0, 110.0]))
+    table = torque_rows(case, {}, np.asarray([0.1, 0.5, 0.5]), np.asarray([60.0, 60.0, 110.0]))
     free = select_free(case, None)
     fit = identify(case, table, None, "posterior")
     posterior = samples_of_rows(case, usable_readings(case, table), free, exact_model=True)

@@ -141,13 +141,17 @@ def test_one_plate_size_tells_k_for_its_width_alone(tmp_path):
     assert "kc" not in found.estimates() and found.soil["kc"] == 0.0
     assert found.estimates()["k"].value == pytest.approx(KC / 0.08 + KPHI, rel=0.01)
     assert "one-plate-size" in codes(found)
-    # the narrower the wheel, the more the unknown share of kc widens the range, and upwards only
-    ranges = [
-        bevameter(table, case=model_file(tmp_path, width=w)).prior["kphi"] for w in (0.08, 0.02)
-    ]
-    assert ranges[1].lower == pytest.approx(ranges[0].lower, rel=1e-5)
-    assert ranges[1].upper == pytest.approx(4.0 * ranges[0].upper, rel=1e-5)
-    assert contains((ranges[1].lower, ranges[1].upper), KC / 0.02 + KPHI)
+    # the range at another width holds all from kphi = 0 to kc = 0
+    same, narrow, wide = (
+        bevameter(table, case=model_file(tmp_path, width=w)) for w in (0.08, 0.02, 0.16)
+    )
+    span = same.prior["kphi"]
+    for other, low, high in ((narrow, 1.0, 4.0), (wide, 0.5, 1.0)):
+        assert other.prior["kphi"].lower == pytest.approx(low * span.lower, rel=1e-3)
+        assert other.prior["kphi"].upper == pytest.approx(high * span.upper, rel=1e-3)
+        assert about(other.remarks, "another-width") == {"kphi"}
+    assert "another-width" not in codes(same)
+    assert contains((narrow.prior["kphi"].lower, narrow.prior["kphi"].upper), KC / 0.02 + KPHI)
 
 
 def test_two_plate_sizes_tell_k_at_the_width_of_the_wheel(tmp_path):
@@ -160,20 +164,41 @@ def test_two_plate_sizes_tell_k_at_the_width_of_the_wheel(tmp_path):
     assert contains((low, high), KC / 0.07 + KPHI)
 
 
-def test_one_normal_stress_shares_the_strength(tmp_path):
-    table, sigma = shear(stresses=(10e3,), repeats=4), 10e3
-    strength = C + sigma * np.tan(PHI)
-    alone = bevameter(shear=table)
-    assert alone.estimates()["shear_strength"].value == pytest.approx(strength, rel=0.01)
-    assert alone.soil["cohesion"] == 0.0
-    assert alone.soil["friction_angle"] == pytest.approx(np.arctan(strength / sigma), rel=0.01)
-    assert alone.prior["friction_angle"].lower < 0.01
-    assert "one-normal-stress" in codes(alone)
-    known = bevameter(shear=table, case=model_file(tmp_path))
-    span = known.prior["friction_angle"]
-    assert (known.prior["cohesion"].lower, known.prior["cohesion"].upper) == (0.0, 2000.0)
-    assert contains((span.lower, span.upper), PHI)
-    assert span.lower > np.arctan((0.7 * strength - 2000.0) / sigma)
+@pytest.mark.parametrize(
+    ("given", "own_prior"),
+    [
+        (None, None),
+        (1000.0, (500.0, 1500.0)),
+        (1000.0, (500.0, 20000.0)),
+        (15000.0, (0.0, 20000.0)),  # above the whole strength
+        (1000.0, None),
+    ],
+)
+def test_one_normal_stress_shares_the_strength(tmp_path, given, own_prior):
+    table, sigma = shear(stresses=(10e3,), repeats=4, scatter=0.02), 10e3
+    case = model_file(
+        tmp_path, prior=f"cohesion = {list(own_prior)}" if own_prior else "n = [1, 2]"
+    )
+    case = None if given is None else case.with_values({"cohesion": given})
+    found = bevameter(shear=table, case=case)
+    strength, soil = found.estimates()["shear_strength"], found.soil
+    assert strength.value == pytest.approx(C + sigma * np.tan(PHI), rel=0.05)
+    assert "one-normal-stress" in codes(found)
+    weakest, strongest = strength.another_place_95
+    lowest, highest = own_prior or (0.0, strongest)
+    highest = min(highest, strongest)
+    assert soil["cohesion"] == pytest.approx(min(given or 0.0, highest), rel=1e-5)
+    tangent = max(strength.value - soil["cohesion"], 0.0) / sigma
+    assert np.tan(soil["friction_angle"]) == pytest.approx(tangent, rel=1e-5, abs=1e-9)
+    ends = {"cohesion": (lowest, highest)}
+    tangents = [max(weakest - highest, 0.0) / sigma, max(strongest - lowest, 0.0) / sigma]
+    ends["friction_angle"] = np.arctan(tangents)
+    for name, span in ends.items():
+        prior = found.prior[name]
+        assert (prior.lower, prior.upper) == pytest.approx(tuple(span), rel=2e-3, abs=1e-3)
+    whose = "the model file's" if own_prior else "0 to the whole strength"
+    (said,) = [r.text for r in found.remarks if r.code == "assumed-range"]
+    assert whose in said
 
 
 def test_a_curved_failure_line_is_said_and_widens_the_ranges():
@@ -297,3 +322,20 @@ def test_shear_tables_without_a_curve_are_refused():
         bevameter(shear=Table(columns | {"normal_stress_Pa": blank}))
     with pytest.raises(InputError, match="no tests"):
         bevameter()
+
+
+def test_json_of_the_result_holds_every_test():
+    found = bevameter(plates(repeats=1), shear(repeats=1))
+    content = found.as_json()
+    assert list(content["estimates"]) == list(found.estimates())
+    entry = content["plate_tests"][1]
+    assert (entry["test"], entry["plate_m"]) == ("0.1_0", 0.1)
+    assert entry["n"] == pytest.approx(N, rel=1e-3)
+    assert entry["k"] == pytest.approx(KC / 0.1 + KPHI, rel=1e-3) and entry["misfit"] < 1e-6
+    entry = content["shear_tests"][2]
+    assert (entry["test"], entry["normal_stress_Pa"]) == ("20000_0", 20e3)
+    assert entry["strength_Pa"] == pytest.approx(C + 20e3 * np.tan(PHI), rel=0.01)
+    assert entry["shear_modulus_m"] == pytest.approx(K, rel=0.02)
+    assert content["soil"] == found.soil
+    assert content["remarks"] == [r.as_json() for r in found.remarks]
+    assert bevameter(plates()).as_json()["shear_tests"] == []
