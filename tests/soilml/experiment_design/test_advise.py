@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from measured_rows import torque_rows
 
-from soilml import read_case
+from soilml import identify
 from soilml.errors import FitError
 from soilml.experiment_design import (
     advise,
     candidate_grid,
     is_identified,
+    samples_of_moments,
     samples_of_prior,
     samples_of_rows,
 )
@@ -18,11 +19,6 @@ from soilml.fitting.usable_readings import usable_readings
 
 SOIL = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
 GRID = candidate_grid([0.05, 0.2, 0.6], [30.0, 60.0, 120.0])
-
-
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
 
 
 def after(case, slip, load, **options):
@@ -71,3 +67,19 @@ def test_points_without_equilibrium_on_possible_soils_are_excluded_and_counted(c
     assert found.excluded_points == 1 and {c.candidate.load for c in found.choices} == {60.0}
     with pytest.raises(FitError, match="smaller loads"):
         advise(case, samples_of_prior(select_free(case, None), 64), candidate_grid([0.2], [1e6]))
+
+
+@pytest.mark.slow
+def test_samples_of_rows_are_as_wide_and_as_correlated_as_the_posterior(case):
+    table = torque_rows(case, {}, np.asarray([0.1, 0.5, 0.5]), np.asarray([60.0, 60.0, 110.0]))
+    free = select_free(case, None)
+    fit = identify(case, table, None, "posterior")
+    posterior = samples_of_rows(case, usable_readings(case, table), free, exact_model=True)
+    from_moments = samples_of_moments(free, fit.names, fit.values, fit.covariance)
+    for found in (posterior, from_moments):
+        np.testing.assert_allclose(
+            found.remaining_fraction, list(fit.remaining_fraction.values()), rtol=0.06
+        )
+        spread = (found.standardised.T * found.weights) @ found.standardised
+        correlation = spread / np.outer(found.remaining_fraction, found.remaining_fraction)
+        np.testing.assert_allclose(correlation, fit.correlation, atol=0.08)

@@ -6,18 +6,13 @@ import numpy as np
 import pytest
 from measured_rows import torque_rows
 
-from soilml import Noise, gap, identify, read_case, simulate
+from soilml import Noise, gap, identify, simulate
 from soilml.errors import FitError, InputError, TableError
 from soilml.fitting.usable_readings import usable_readings
 from soilml.io.table import Table
 from soilml.remarks import about, texts
 
 SHEAR = ["friction_angle", "shear_modulus"]
-
-
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
 
 
 @pytest.fixture

@@ -17,11 +17,6 @@ SLIPS = np.tile(np.linspace(0.1, 0.6, 6), 3)
 LOADS = np.repeat([40.0, 70.0, 110.0], 6)
 
 
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
-
-
 def test_recovers_the_truth_from_rows_without_noise(case):
     fit = identify(case, torque_rows(case, TRUTH, SLIPS, LOADS), method="nonlinear")
     for name, value in TRUTH.items():
@@ -150,23 +145,6 @@ def test_a_channel_whose_noise_is_not_declared_is_left_out_and_named(case):
     assert any("sinkage_m is not used" in said for said in texts(fit.warnings))
 
 
-def test_noise_of_slip_widens_the_answer(case):
-    table = torque_rows(case, TRUTH, SLIPS, LOADS, noise=0.02)
-    slipping = replace(case, noise=case.noise | {"slip": Noise(0.02)})
-    assert (
-        identify(slipping, table, method="nonlinear").std
-        > identify(case, table, method="nonlinear").std
-    ).all()
-
-
-def test_more_misfit_than_noise_is_said_and_widens(case):
-    table = torque_rows(case, TRUTH, SLIPS, LOADS)
-    table.columns["torque_Nm"] = table["torque_Nm"] * (1.0 + 0.3 * np.sin(7 * SLIPS))
-    fit = identify(case, table, method="nonlinear")
-    assert any("times the declared noise" in said for said in texts(fit.warnings))
-    assert fit.misfit > 3.0
-
-
 def test_a_table_of_another_wheel_is_refused(case):
     table = torque_rows(case, TRUTH, SLIPS, LOADS)
     table.columns["wheel_radius_m"] = np.where(np.arange(18) == 4, 0.1, 0.15)
@@ -245,18 +223,6 @@ def test_newton_raphson_says_when_the_rows_do_not_determine_all(case):
     alike = torque_rows(case, TRUTH, np.full(4, 0.3), np.full(4, 60.0), noise=0.05)
     with pytest.raises(FitError, match="Newton-Raphson"):
         identify(case, alike, method="newton")
-
-
-def test_json_holds_what_is_promised(case):
-    content = identify(
-        case, torque_rows(case, TRUTH, SLIPS, LOADS, noise=0.02), method="nonlinear"
-    ).as_json()
-    assert content["method"] == "nonlinear"
-    assert set(content["parameters"]) == set(TRUTH)
-    assert set(content["parameters"]["cohesion"]) >= {"value", "std", "unit"}
-    assert content["parameters"]["cohesion"]["unit"] == "Pa"
-    assert -1.0 <= content["correlation"]["cohesion"]["friction_angle"] <= 1.0
-    assert content["rows_used"] == 18
 
 
 OFFSET = """[[effect]]

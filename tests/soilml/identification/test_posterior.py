@@ -8,7 +8,7 @@ from gap_sets import MODEL, case_of, driven
 from measured_rows import torque_rows
 from remarked import remarked
 
-from soilml import Operating, identify, read_case
+from soilml import Operating, identify
 from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError
 from soilml.fitting.coordinates import select_free
@@ -21,11 +21,6 @@ from soilml.remarks import texts
 
 SLIPS = np.tile(np.linspace(0.1, 0.6, 4), 2)
 LOADS = np.repeat([40.0, 100.0], 4)
-
-
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
 
 
 TRUTH = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}

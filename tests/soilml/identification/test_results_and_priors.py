@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from soilml import read_case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.misfit import misfit_limit
@@ -31,11 +30,6 @@ def fit_of(**changes):
         remaining_fraction={"cohesion": 0.3, "friction_angle": 0.2},
     )
     return replace(fit, **changes)
-
-
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
 
 
 def test_priors_that_nobody_gave_are_those_of_natural_soils(case):

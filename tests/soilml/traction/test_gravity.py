@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from remarked import remarked
 
-from soilml import Operating, read_case
+from soilml import Operating
 from soilml.io.table import Table
 from soilml.numerics.quantiles import quantile_band
 from soilml.physics.soils.gravity_law import GravityChange
@@ -18,11 +18,6 @@ EARTH, MOON = 9.80665, 1.62
 SCHOOLS = ("constant", "proportional")
 SOIL = {"kphi": 1.5e6, "friction_angle": 0.6, "shear_modulus": 0.012, "unit_weight": 15000.0}
 SOIL |= {"cohesion": 500.0, "kc": 990.0, "n": 1.1}
-
-
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
 
 
 def test_draws_are_those_of_a_model_with_the_changed_soil(case):

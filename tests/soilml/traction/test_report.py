@@ -4,18 +4,13 @@ import numpy as np
 import pytest
 from remarked import remarked
 
-from soilml import Operating, SlipSinkage, read_case
+from soilml import Operating, SlipSinkage
 from soilml.config.measurement_noise import Noise
 from soilml.io.table import Table
 from soilml.traction.report import pull_report
 from soilml.traction.soil_draws import measured_soil
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
 
 
 def test_a_sinkage_that_the_model_cannot_explain_is_said_and_widens_the_band(case):

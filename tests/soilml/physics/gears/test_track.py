@@ -165,16 +165,6 @@ def test_forces_of_the_profile_are_those_of_the_force(shape, slip):
     assert force.torque == pytest.approx(track.radius * total(profile.shear), rel=1e-4)
 
 
-def test_grousers_far_slipped_shear_the_whole_block():
-    """Cohesion on the tips' plane and both sides, friction on the plane: eq. 13 beyond j_k."""
-    ground = replace(CLAY, shear_modulus=1e-4)
-    force = (TRACK + Grousers(spacing=1.0, height=0.012))(ground, Operating(slip=0.9, load=LOAD))
-    bare = TRACK(ground, Operating(slip=0.9, load=LOAD))
-    area = (bare.torque / 0.1 - LOAD * np.tan(ground.friction_angle)) / ground.cohesion
-    sides = force.torque / 0.1 - bare.torque / 0.1
-    assert sides == pytest.approx(ground.cohesion * area * 2.0 * 0.012 / 0.08, rel=0.1)
-
-
 def test_what_cannot_be_is_refused():
     with pytest.raises(InputError, match="above twice the radius"):
         Track(radius=0.3, width=0.1, base=0.6)
