@@ -3,18 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-from conftest import THREE_CHANNEL_MODEL
 
-from soilml import Operating, read_case, simulate
+from soilml import Operating, simulate
 from soilml.io.table import Table
 
 CHANNELS = {"torque_Nm": "torque", "drawbar_pull_N": "drawbar_pull", "sinkage_m": "sinkage"}
-
-
-def with_model(tmp_path, text=THREE_CHANNEL_MODEL):
-    path = tmp_path / "model.toml"
-    path.write_text(text)
-    return read_case(path)
 
 
 def measured(case, rng, rows, channels=CHANNELS, gear=None, least_slip=-0.05):

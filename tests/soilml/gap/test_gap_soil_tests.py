@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bevameter_tables import KC, KPHI, PHI, C, N, plates, shear
+from gap_sets import case_of
 from remarked import remarked
 
-from soilml import Case, Model, Operating, Table, Wheel, soil
+from soilml import Model, Operating, Table, Wheel, soil
 from soilml.config.measurement_noise import Noise
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.least_squares import SoilTestTerms
@@ -22,23 +23,11 @@ from soilml.remarks import texts
 pytestmark = pytest.mark.slow
 
 SAND = soil("wong1989/dry_sand")
-KNOWN = {
-    "kc": SAND.kc,
-    "kphi": SAND.kphi,
-    "n": SAND.n,
-    "cohesion": SAND.cohesion,
-    "friction_angle": SAND.friction_angle,
-}
-CASE = Case(
-    Model(Wheel(radius=0.15, width=0.12)),
-    SAND,
-    {
-        "cohesion": Prior(0.0, 3000.0),
-        "friction_angle": Prior(0.3, 0.8),
-        "shear_modulus": Prior(0.005, 0.05),
-        "kphi": Prior(1e5, 1e7, log=True),
-    },
-    {"torque_Nm": Noise(share=0.02), "sinkage_m": Noise(share=0.03)},
+KNOWN = {name: getattr(SAND, name) for name in ("kc", "kphi", "n", "cohesion", "friction_angle")}
+CASE = replace(
+    case_of(),
+    prior=case_of().prior | {"kphi": Prior(1e5, 1e7, log=True)},
+    noise={"torque_Nm": Noise(share=0.02), "sinkage_m": Noise(share=0.03)},
 )
 SLIP, LOAD = np.tile(np.linspace(0.05, 0.6, 7), 3), np.repeat([40.0, 70.0, 120.0], 7)
 

@@ -289,37 +289,30 @@ def test_odd_units_are_remarked_on():
         assert about(bevameter(shear=Table(wrong)).remarks, "doubtful-unit") == about_them
 
 
-MISTAKES = {
-    "no plate": ("plate_radius_m", None, "the size of the plate is missing"),
-    "no pressure": ("pressure_Pa", None, "pressure_Pa or load_N"),
-    "nothing measured": ("pressure_Pa", np.nan, "more samples with growing sinkage"),
-    "no sinkage": ("sinkage_m", None, "sinkage_m is missing"),
-}
+MISTAKES = [
+    (plates, "plate_radius_m", None, "the size of the plate is missing"),
+    (plates, "pressure_Pa", None, "pressure_Pa or load_N"),
+    (plates, "pressure_Pa", np.nan, "more samples with growing sinkage"),
+    (plates, "sinkage_m", None, "sinkage_m is missing"),
+    (shear, "normal_stress_Pa", None, "column normal_stress_Pa is missing"),
+    (shear, "shear_displacement_m", None, "column shear_displacement_m is missing"),
+    (shear, "shear_stress_Pa", np.nan, "samples with a displacement and a shear"),
+    (shear, "normal_stress_Pa", np.nan, "no normal stress above zero"),
+]
 
 
-@pytest.mark.parametrize(("key", "value", "said"), MISTAKES.values(), ids=MISTAKES)
-def test_plate_tables_without_a_curve_are_refused(key, value, said):
-    columns = dict(plates().columns)
-    if value is None:
-        del columns[key]
-    else:
-        columns[key] = np.full(len(columns[key]), value)
+@pytest.mark.parametrize(("tests", "key", "value", "said"), MISTAKES)
+def test_tables_without_a_curve_are_refused(tests, key, value, said):
+    table = tests(repeats=12)
+    columns = {name: table[name] for name in table.columns if name != key}
+    if value is not None:
+        columns[key] = np.full(len(table), value)
+    kind = "plates" if tests is plates else "shear"
     with pytest.raises(TableError, match=said):
-        bevameter(Table(columns))
+        bevameter(**{kind: Table(columns)})
 
 
-def test_shear_tables_without_a_curve_are_refused():
-    columns = shear().columns
-    with pytest.raises(TableError, match="column normal_stress_Pa is missing"):
-        bevameter(shear=Table({k: v for k, v in columns.items() if k != "normal_stress_Pa"}))
-    many = {k: np.repeat(v, 6) for k, v in columns.items() if k != "shear_displacement_m"}
-    with pytest.raises(TableError, match="column shear_displacement_m is missing"):
-        bevameter(shear=Table(many))
-    blank = np.full(len(columns["test"]), np.nan)
-    with pytest.raises(TableError, match="samples with a displacement and a shear"):
-        bevameter(shear=Table(columns | {"shear_stress_Pa": blank}))
-    with pytest.raises(TableError, match="no normal stress above zero"):
-        bevameter(shear=Table(columns | {"normal_stress_Pa": blank}))
+def test_no_tests_are_refused():
     with pytest.raises(InputError, match="no tests"):
         bevameter()
 

@@ -172,9 +172,25 @@ def test_linear_least_squares_carries_the_doubt_about_the_shear_modulus(case):
     given = closed(case).with_values({"shear_modulus": 0.012})
     given = replace(given, noise=case.noise | {"sinkage_m": Noise(1e-4)})
     table = torque_rows(given, TRUTH, SLIPS, LOADS, more=["sinkage_m"])
-    believed = identify(replace(given, prior={}), table, ["cohesion"], method="linear")
     doubted = identify(given, table, method="linear")
+    prior = given.prior["shear_modulus"]
+    middle = 0.5 * (prior.lower + prior.upper)
+    believed, *moved = (
+        identify(
+            replace(given.with_values({"shear_modulus": value}), prior={}),
+            table,
+            ["cohesion", "friction_angle"],
+            method="linear",
+        )
+        for value in (0.012, middle - prior.std, middle + prior.std)
+    )
+    changes = [fit.values - believed.values for fit in moved]
+    spread = 0.5 * sum(np.outer(change, change) for change in changes)
+    np.testing.assert_allclose(doubted.covariance, believed.covariance + spread, rtol=1e-6)
     assert (doubted.std > 3.0 * believed.std).all()
+    fixed = "shear_modulus is fixed at 0.012"
+    assert f"{fixed}; the width of its prior is propagated into std" in texts(doubted.warnings)
+    assert f"{fixed} and treated as exact: it has no prior" in texts(believed.warnings)
 
 
 def test_linear_least_squares_needs_sinkage_and_two_rows(case):

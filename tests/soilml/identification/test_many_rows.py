@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from measured_rows import measured, two_gears, with_model
+from conftest import THREE_CHANNEL_MODEL
+from gap_sets import case_of
+from measured_rows import measured, two_gears
 from remarked import remarked
 
 from soilml import identification, identify
@@ -21,8 +23,8 @@ ROWS = 2400
 
 
 @pytest.fixture
-def case(tmp_path):
-    return with_model(tmp_path)
+def case():
+    return case_of(THREE_CHANNEL_MODEL)
 
 
 @pytest.fixture

@@ -6,30 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from soilml.errors import FitError
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.misfit import misfit_limit
-from soilml.identification.fit import Fit
-from soilml.identification.linear import with_fixed_parameter
 from soilml.identification.trained_estimator import SAME_PRIOR, narrower_priors
 from soilml.numerics.prior import Prior
-from soilml.remarks import Remark, texts
-
-COVARIANCE = np.asarray([[4.0, 1.2], [1.2, 1.0]])
-
-
-def fit_of(**changes):
-    fit = Fit(
-        method="nonlinear",
-        names=("cohesion", "friction_angle"),
-        units=("Pa", "rad"),
-        values=np.asarray([10.0, 0.5]),
-        covariance=COVARIANCE,
-        warnings=(Remark("first", "first"),),
-        rows_used=3,
-        remaining_fraction={"cohesion": 0.3, "friction_angle": 0.2},
-    )
-    return replace(fit, **changes)
 
 
 def test_priors_that_nobody_gave_are_those_of_natural_soils(case):
@@ -48,40 +28,6 @@ def test_priors_that_nobody_gave_are_those_of_natural_soils(case):
     assert [f.unit for f in free] == ["Pa", "rad", "m", "1"]
     assert free[3].nominal == case.soil.n
     assert [f.path for f in select_free(case, None)] == list(case.prior)
-
-
-def test_a_parameter_that_is_held_fixed_widens_the_others_by_its_prior(case):
-    """For a linear solution the covariance grows by the prior's variance times its square."""
-
-    def solve(one):
-        c = float(one.soil.cohesion)
-        values = np.asarray([c, 0.5 + 2e-4 * c])
-        return fit_of(values=values, covariance=np.diag([1.0, 1e-4]))
-
-    known = replace(case, soil=replace(case.soil, cohesion=200.0))
-    known = replace(known, prior={"cohesion": Prior(0.0, 1200.0)})
-    found = with_fixed_parameter(known, "cohesion", solve)
-    # a uniform prior has the variance (b - a)^2 / 12; the value is 400 Pa below its middle
-    slope = np.asarray([1.0, 2e-4])
-    spread = 1200.0**2 / 12.0 + 400.0**2
-    expected = np.diag([1.0, 1e-4]) + spread * np.outer(slope, slope)
-    np.testing.assert_allclose(found.covariance, expected, rtol=1e-9)
-    assert texts(found.warnings) == [
-        "cohesion is fixed at 200; the width of its prior is propagated into std",
-        "first",
-    ]
-    exact = with_fixed_parameter(replace(known, prior={}), "cohesion", solve)
-    assert "treated as exact" in exact.warnings[0].text
-    np.testing.assert_array_equal(exact.covariance, np.diag([1.0, 1e-4]))
-
-    def fails_above(one):
-        if float(one.soil.cohesion) > 600.0:
-            raise FitError("no")
-        return solve(one)
-
-    part = with_fixed_parameter(known, "cohesion", fails_above)
-    below = 600.0 - 1200.0 / 12.0**0.5 - 200.0
-    np.testing.assert_allclose(part.covariance[0, 0], 1.0 + 0.5 * below**2, rtol=1e-9)
 
 
 def test_noise_alone_exceeds_the_limit_of_the_misfit_once_in_a_thousand():
