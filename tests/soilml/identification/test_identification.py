@@ -145,6 +145,15 @@ def test_a_channel_whose_noise_is_not_declared_is_left_out_and_named(case):
     assert any("sinkage_m is not used" in said for said in texts(fit.warnings))
 
 
+def test_more_misfit_than_noise_is_said_with_the_ends_of_priors_that_it_reaches(case):
+    table = torque_rows(case, TRUTH, SLIPS, LOADS)
+    table.columns["torque_Nm"] = table["torque_Nm"] * (1.0 + 0.3 * np.sin(7 * SLIPS))
+    fit = identify(case, table, method="nonlinear")
+    codes = {remark.code for remark in fit.warnings}
+    assert any("times the declared noise" in said for said in texts(fit.warnings))
+    assert "at-prior-bound" in codes and fit.misfit > 3.0
+
+
 def test_a_table_of_another_wheel_is_refused(case):
     table = torque_rows(case, TRUTH, SLIPS, LOADS)
     table.columns["wheel_radius_m"] = np.where(np.arange(18) == 4, 0.1, 0.15)
