@@ -6,6 +6,7 @@ import functools
 import os
 import signal
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -182,7 +183,7 @@ def _exported(folder: Path, family, posterior, noise) -> Path:
 
     path = folder / "small.onnx"
     spec = AnyWheelSpec(family, ResponseSettings(0, 0, 0, 0), noise, "{}")
-    export_any_wheel(spec, posterior, {}, path)
+    export_any_wheel(spec, replace(posterior, noise=noise), {}, path)
     return path
 
 

@@ -25,9 +25,9 @@ targets = ["cohesion", "friction_angle", "shear_modulus"]
 [[regressor]]
 type = "linear"
 [set_posterior]
-designs = 600
+designs = 512
 hidden = 24
-epochs = 60
+epochs = 40
 """
 
 
