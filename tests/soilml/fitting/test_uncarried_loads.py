@@ -18,7 +18,7 @@ PEAK = r"a0 \+ a1 slip is {} at slip {}, and must be above 0 and below 1; change
     ("a0", "a1", "load", "said"),
     [
         (0.0, 0.0, 60.0, PEAK.format("0", r"0\.1")),
-        (0.9, 0.5, 60.0, PEAK.format(r"1\.1", r"0\.4")),
+        (0.98, 0.5, 60.0, PEAK.format(r"1\.03", r"0\.1")),
         (0.4, 0.0, 1e6, "no parameters in the prior carry the measured loads: check load_N"),
     ],
 )
