@@ -41,3 +41,16 @@ def test_a_file_alone_is_described_in_one_line(folder, capsys):
     assert main(["estimate", ANY_WHEEL]) == 0
     said = one_line(capsys.readouterr().out)
     assert "radius 0.04 to 0.5 m" in said and "0 to 1 cohesion_max" in said
+
+
+@pytest.mark.parametrize(
+    ("rows", "verdict"),
+    [
+        ("a,0.2,60,2\na,0.3,60,3\n", "0 of 1 run is estimated; rows disagree with the model: run "),
+        ("a,1,60,2\na,-1,60,-2\n", "0 of 1 run is estimated; it is outside what the file was "),
+    ],
+)
+def test_the_verdict_says_why_runs_are_not_estimated(folder, capsys, rows, verdict):
+    (folder / "runs.csv").write_text(f"run,slip,load_N,torque_Nm\n{rows}")
+    assert main(["estimate", WHEEL, "runs.csv", "--by", "run"]) == 0
+    assert capsys.readouterr().out.startswith(verdict)
