@@ -132,6 +132,14 @@ def model_file(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.fixture
+def case(model_file: Path):
+    """The case of the reference wheel."""
+    from soilml import read_case
+
+    return read_case(model_file)
+
+
 @pytest.fixture(scope="session")
 def small_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Some thousand rows, a quarter of them in runs of 32."""

@@ -1,20 +1,13 @@
-"""Measured rows of a case with three channels, and of one with two gears, for tests of fits."""
+"""Measured rows of a case, of one with three channels and of one with two gears."""
 
 from dataclasses import replace
 
 import numpy as np
-from conftest import THREE_CHANNEL_MODEL
 
-from soilml import Operating, read_case
+from soilml import Operating, simulate
 from soilml.io.table import Table
 
 CHANNELS = {"torque_Nm": "torque", "drawbar_pull_N": "drawbar_pull", "sinkage_m": "sinkage"}
-
-
-def with_model(tmp_path, text=THREE_CHANNEL_MODEL):
-    path = tmp_path / "model.toml"
-    path.write_text(text)
-    return read_case(path)
 
 
 def measured(case, rng, rows, channels=CHANNELS, gear=None, least_slip=-0.05):
@@ -31,6 +24,15 @@ def measured(case, rng, rows, channels=CHANNELS, gear=None, least_slip=-0.05):
             value[own] = getattr(models[name](true.soil, at), CHANNELS[key])
         columns[key] = value + case.noise[key].std(value) * rng.standard_normal(rows)
     return Table(columns if gear is None else {"gear": gear, **columns})
+
+
+def torque_rows(case, truth, slip, load, noise=0.0, seed=0, more=()):
+    """One run on the soil of `truth`: its torque with a share of noise, and more channels."""
+    rows = simulate(case.with_values(truth), slip, load, run="a")
+    found = Table({name: rows[name] for name in ("run", "slip", "load_N", "torque_Nm", *more)})
+    factor = 1.0 + noise * np.random.default_rng(seed).standard_normal(len(found))
+    found.columns["torque_Nm"] = found["torque_Nm"] * factor
+    return found
 
 
 def two_gears(case):

@@ -14,6 +14,12 @@ from scipy.integrate import IntegrationWarning, quad
 from scipy.optimize import brentq
 
 
+def row_of(ground, **driven):
+    """A row of the reference: values of a soil, with gear, slip and load as given."""
+    names = ("cohesion", "friction_angle", "shear_modulus", "kc", "kphi", "n", "a0", "a1")
+    return {name: getattr(ground, name) for name in names} | driven
+
+
 def travel_ratio(slip, law="displacement-sign"):
     """v / (r omega) in the shear displacement."""
     return 1.0 - slip if slip >= 0 or law == "slip-sign" else 1.0 / (1.0 + slip)

@@ -176,3 +176,32 @@ def test_mistakes_are_named_with_their_place(tmp_path, what):
         read_case(written(tmp_path, MODEL.replace(old, new, 1)))
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+EFFECTS = """\
+[[effect]]
+name = "slip-sinkage"
+n1 = 0.3712345678901234
+by_slip = -1.2345678901234
+by_load = 0.1
+[effect.prior]
+n1 = [0.0, 1.0]
+[[effect]]
+name = "torque-offset"
+offset = 1e-05
+"""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        MODEL + EFFECTS,
+        MODEL.replace('"wheel"', '"linear-wheel"'),
+        MODEL.replace("cohesion = [0.0, 3000.0]", 'kphi = { range = [1e5, 1e7], scale = "log" }'),
+        MODEL.replace('"2 %"', "0.05"),
+    ],
+)
+def test_a_case_that_was_written_is_read_again_to_the_last_digit(tmp_path, text):
+    case = read_case(written(tmp_path, text))
+    again = read_case(written(tmp_path, case_as_toml(case, ["a comment", "another one"])))
+    assert again == case and case_as_toml(again) == case_as_toml(case)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from remarked import remarked
 
-from soilml import EFFECTS, Estimator, LinearWheel, Model, Track, read_case
+from soilml import EFFECTS, Estimator, LinearWheel, Model, Track
 from soilml.config import compatibility as comparing
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError, TableError
@@ -19,11 +19,6 @@ from soilml.identification.model_error_inputs import with_exact_model
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.remarks import texts
-
-
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
 
 
 def wheel(case, **sizes):

@@ -2,37 +2,28 @@
 
 import numpy as np
 import pytest
+from measured_rows import torque_rows
 
-from soilml import Operating, read_case
+from soilml import identify
 from soilml.errors import FitError
 from soilml.experiment_design import (
     advise,
     candidate_grid,
     is_identified,
+    samples_of_moments,
     samples_of_prior,
     samples_of_rows,
 )
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.usable_readings import usable_readings
-from soilml.io.table import Table
 
 SOIL = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
 GRID = candidate_grid([0.05, 0.2, 0.6], [30.0, 60.0, 120.0])
 
 
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
-
-
 def after(case, slip, load, **options):
     """Advice after rows driven so on SOIL without noise."""
-    true = case.with_values(SOIL)
-    at = Operating(slip=np.asarray(slip), load=np.asarray(load))
-    torque = true.model(true.soil, at).torque
-    run = np.full(len(slip), "a")
-    table = Table({"run": run, "slip": at.slip, "load_N": at.load, "torque_Nm": torque})
-    data = usable_readings(case, table)
+    data = usable_readings(case, torque_rows(case, SOIL, slip, load))
     samples = samples_of_rows(case, data, select_free(case, None), 1024, exact_model=True)
     return advise(case, samples, GRID, measured=data.at, outcome_count=200, **options)
 
@@ -60,11 +51,8 @@ def test_the_realised_width_after_a_plan_is_the_expected_one(case):
     rng, free, left = np.random.default_rng(4), select_free(case, None), []
     slip, load = np.asarray(points).T
     for _ in range(16):
-        true = case.with_values({f.path: float(f.prior.at(rng.random())) for f in free})
-        torque = true.model(true.soil, Operating(slip=slip, load=load)).torque
-        torque = torque * (1.0 + 0.02 * rng.standard_normal(2))
-        run = np.asarray(["a", "a"])
-        table = Table({"run": run, "slip": slip, "load_N": load, "torque_Nm": torque})
+        true = {f.path: float(f.prior.at(rng.random())) for f in free}
+        table = torque_rows(case, true, slip, load, noise=0.02, seed=rng)
         found = samples_of_rows(case, usable_readings(case, table), free, exact_model=True)
         left.append(found.remaining_fraction)
     realised = np.sqrt(np.mean(np.square(left), axis=0))
@@ -79,3 +67,19 @@ def test_points_without_equilibrium_on_possible_soils_are_excluded_and_counted(c
     assert found.excluded_points == 1 and {c.candidate.load for c in found.choices} == {60.0}
     with pytest.raises(FitError, match="smaller loads"):
         advise(case, samples_of_prior(select_free(case, None), 64), candidate_grid([0.2], [1e6]))
+
+
+@pytest.mark.slow
+def test_samples_of_rows_are_as_wide_and_as_correlated_as_the_posterior(case):
+    table = torque_rows(case, {}, np.asarray([0.1, 0.5, 0.5]), np.asarray([60.0, 60.0, 110.0]))
+    free = select_free(case, None)
+    fit = identify(case, table, None, "posterior")
+    posterior = samples_of_rows(case, usable_readings(case, table), free, exact_model=True)
+    from_moments = samples_of_moments(free, fit.names, fit.values, fit.covariance)
+    for found in (posterior, from_moments):
+        np.testing.assert_allclose(
+            found.remaining_fraction, list(fit.remaining_fraction.values()), rtol=0.06
+        )
+        spread = (found.standardised.T * found.weights) @ found.standardised
+        correlation = spread / np.outer(found.remaining_fraction, found.remaining_fraction)
+        np.testing.assert_allclose(correlation, fit.correlation, atol=0.08)

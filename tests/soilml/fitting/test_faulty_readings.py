@@ -6,22 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import THREE_CHANNEL_MODEL
+from gap_sets import case_of
 
-from soilml import Table, gap, identify, read_case, simulate
+from soilml import Table, gap, identify, simulate
 from soilml.errors import TableError
+from soilml.fitting.faulty_readings import sound_rows
 
 SLIP, LOAD = np.tile(np.linspace(0.08, 0.5, 8), 4), np.repeat([45.0, 80.0, 45.0, 110.0], 8)
 RUN = np.repeat([1, 2, 3, 4], 8)
 
 
 @pytest.fixture(scope="module")
-def case(tmp_path_factory):
+def case():
     """Three noisy channels of a wheel on sand."""
-    from conftest import THREE_CHANNEL_MODEL
-
-    file = tmp_path_factory.mktemp("faults") / "model.toml"
-    file.write_text(THREE_CHANNEL_MODEL)
-    return read_case(file)
+    return case_of(THREE_CHANNEL_MODEL)
 
 
 def driven(case, seed=0):
@@ -113,8 +112,6 @@ def test_sound_rows_of_any_resolution_are_all_used(case, digits):
         table = driven(case, seed)
         names = ("torque_Nm", "drawbar_pull_N")
         rounded = changed(table, **{n: np.round(table[n], digits) for n in names})
-        from soilml.fitting.faulty_readings import sound_rows
-
         found, remarks = sound_rows(case, rounded)
         assert remarks == [] and found is rounded
 

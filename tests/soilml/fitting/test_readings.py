@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_sets import MODEL, case_of, driven
+from gap_sets import case_of, driven
 
 from soilml.errors import InputError
 from soilml.fitting.readings import stack_readings, typical_std
@@ -42,6 +42,7 @@ def test_noise_that_is_not_positive_is_not_declared():
     assert found.std[:4] == pytest.approx([0.1, np.nan, np.nan, 0.5], nan_ok=True)
     noise = case_of().noise
     assert found.noise == (noise["torque_Nm"], noise["sinkage_m"])
+    assert found.std[4:] == pytest.approx(noise["sinkage_m"].std(found.measured[4:]))
     assert found.from_case.tolist() == [False] * 4 + [True] * 4  # the table has that of torque
     assert found.slip_std.tolist() == [0.01, 0.02, 0.0, 0.03, 0.05]
     assert typical_std(found.slip_std) == pytest.approx(0.025)  # the median of those above zero
@@ -100,13 +101,3 @@ def test_more_readings_than_fit_are_refused_with_what_to_leave_out(more, every):
         return
     with pytest.raises(InputError, match=f"^runs.csv: {n} readings in {n} rows.* of {every}$"):
         _check_size(table)
-
-
-def test_noise_in_the_model_is_that_of_the_readings():
-    """Where a table declares none, each reading has the noise of its model file."""
-    assert "2 %" not in MODEL
-    case = case_of()
-    found = stack_readings(case, driven(case))
-    for i, name in enumerate(("torque_Nm", "drawbar_pull_N", "sinkage_m")):
-        here = found.channel == i
-        assert found.std[here] == pytest.approx(case.noise[name].std(found.measured[here]))

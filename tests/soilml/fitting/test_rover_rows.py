@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gap_sets import case_of
 
-from soilml import read_case
 from soilml.errors import TableError
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.table import Table
@@ -34,9 +34,8 @@ second = { position = [-0.4, -0.11], gear = "narrow" }
 
 
 @pytest.fixture
-def case(tmp_path):
-    (tmp_path / "m.toml").write_text(MODEL)
-    return read_case(tmp_path / "m.toml")
+def case():
+    return case_of(MODEL)
 
 
 def rows(**columns):

@@ -1,6 +1,7 @@
 """Progress of a campaign and direction of its loads, from the order of the rows."""
 
 import numpy as np
+import pytest
 
 from soilml import EFFECTS, Case, Model, Wheel, simulate, soil
 from soilml.fitting.levels import replicate_rows
@@ -44,29 +45,29 @@ def test_columns_are_added_for_effects_that_use_them_alone():
     np.testing.assert_array_equal(with_order_columns(drifting, own)["progress"], 0.0)
 
 
-def test_sorted_rows_have_no_progress_unless_they_were_timed():
-    slip, load = np.tile(np.linspace(0.1, 0.6, 8), 3), np.repeat([40.0, 60.0, 90.0], 8)
-    columns = {"run": np.repeat(["a", "b", "c"], 8), "slip": slip, "load_N": load}
-    assert "progress" not in with_order_columns(PLAIN, Table(columns), FROM_ORDER)
-    timed = Table(columns | {"time_s": np.arange(24.0)})
-    assert "progress" in with_order_columns(PLAIN, timed, FROM_ORDER)
+SORTED = {
+    "run": np.repeat(["a", "b", "c", "d"], 4),
+    "slip": np.tile(np.linspace(0.1, 0.6, 4), 4),
+    "load_N": np.repeat([40.0, 60.0, 90.0, 110.0], 4),
+}
 
 
-def test_two_runs_that_differ_may_do_so_for_any_reason():
-    two = rows(run=np.repeat(["a", "b"], 8))
-    assert "progress" not in with_order_columns(PLAIN, two, FROM_ORDER)
-
-
-def test_rows_of_runs_that_alternate_have_no_order_unless_they_were_timed():
-    mixed = np.tile(["a", "b", "c", "d"], 4)
-    assert (
-        with_order_columns(PLAIN, rows(run=mixed), FROM_ORDER).columns.keys()
-        == rows().columns.keys()
-    )
-    timed = with_order_columns(
-        PLAIN, rows(run=np.repeat(["a"], 16), time_s=np.arange(16.0)), FROM_ORDER
-    )
-    assert {"progress", "load_direction"} <= timed.columns.keys()
+@pytest.mark.parametrize(
+    ("columns", "ordered"),
+    [
+        ({}, True),
+        (SORTED, False),
+        (SORTED | {"time_s": np.arange(16.0)}, True),
+        ({"run": np.repeat(["a", "b"], 8)}, False),  # two runs may differ for any reason
+        ({"run": np.tile(["a", "b", "c", "d"], 4)}, False),
+        ({"run": np.repeat(["a"], 16), "time_s": np.arange(16.0)}, True),
+    ],
+    ids=["mixed", "sorted", "sorted and timed", "two runs", "runs in turn", "one run, timed"],
+)
+def test_rows_have_an_order_unless_it_may_be_that_of_slip_load_or_run(columns, ordered):
+    table = rows(**columns)
+    added = with_order_columns(PLAIN, table, FROM_ORDER).columns.keys() - table.columns.keys()
+    assert ("progress" in added) == ordered
 
 
 def test_simulated_rows_say_that_the_campaign_is_over():

@@ -5,16 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from soilml import Noise, Prior, gap, identify, read_case, simulate
+from soilml import Noise, simulate
 from soilml.cli.output import save_columns
 from soilml.errors import InputError
 from soilml.fitting import simulation
 from soilml.io.read_table import read_table
-
-
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
 
 
 def test_rows_are_those_of_the_model_in_blocks_and_say_where_there_is_none(case, monkeypatch):
@@ -22,6 +17,7 @@ def test_rows_are_those_of_the_model_in_blocks_and_say_where_there_is_none(case,
     whole, counted = simulate(case, slip, load), []
     monkeypatch.setattr(simulation, "BLOCK", 2)
     rows = simulate(case, slip, load, speed=0.05, on_rows=counted.append)
+    assert simulate(case, 0.1, 60.0, run="one")["run"].tolist() == ["one"]
     assert counted == [2, 3] and rows["speed_m_s"].tolist() == [0.05] * 3
     assert rows.answered.tolist() == [True, False, True] and np.isnan(rows["torque_Nm"][1])
     for name in ("torque_Nm", "drawbar_pull_N", "sinkage_m", "entry_angle_rad"):
@@ -50,20 +46,6 @@ def test_noise_is_that_of_the_case_and_its_seed(case):
     np.testing.assert_array_equal(noisy["sinkage_m"], exact["sinkage_m"])
     again = simulate(case, slip, 60.0, seed=1)
     np.testing.assert_array_equal(again["torque_Nm"], noisy["torque_Nm"])
-
-
-def test_simulated_rows_are_read_by_identify_and_gap(case):
-    case = replace(
-        case,
-        prior={"friction_angle": Prior(0.3, 0.8)},
-        noise={"torque_Nm": Noise(share=0.02), "drawbar_pull_N": Noise(constant=0.3)},
-    )
-    slip, load = np.tile(np.linspace(0.05, 0.6, 8), 2), np.repeat([40.0, 80.0], 8)
-    rows = simulate(case, slip, load, run=np.repeat(["a", "b"], 8), seed=2)
-    fit = identify(case, rows, method="nonlinear")
-    assert abs(fit["friction_angle"] - case.soil.friction_angle) < 4.0 * fit.std[0]
-    assert gap(case, rows).status == "no-gap"
-    assert simulate(case, 0.1, 60.0, run="one")["run"].tolist() == ["one"]
 
 
 def test_a_case_of_several_gears_is_refused(case):

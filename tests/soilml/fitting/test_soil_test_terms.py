@@ -38,15 +38,6 @@ def some_rows(case, soil_of_rows=SAND, seed=0):
     return Table({"slip": SLIP, "load_N": LOAD, "torque_Nm": torque * noise})
 
 
-def test_a_test_states_what_the_soil_predicts_by_hand():
-    known = {"kc": 1000.0, "kphi": 1e6, "n": 1.0, "cohesion": 500.0, "friction_angle": 0.5}
-    pressure = (1000.0 / 0.05 + 1e6) * 0.02
-    assert PLATE.predicted(known) == pytest.approx(pressure)
-    assert PLATE.deviation(known) == pytest.approx(np.log(pressure / 20000.0) / 0.15)
-    strength = 500.0 + 8000.0 * np.tan(0.5)
-    assert SHEAR.deviation(known) == pytest.approx(np.log(strength / 5000.0) / 0.1)
-
-
 def test_model_file_keeps_tests_and_takes_units(tmp_path):
     text = case_as_toml(a_case())
     tests = (

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import MODEL
+from measured_rows import torque_rows
 
-from soilml import Noise, Operating, gap, identify, read_case, simulate
+from soilml import Noise, gap, identify, simulate
 from soilml.errors import FitError, InputError, TableError
 from soilml.fitting.usable_readings import usable_readings
 from soilml.io.table import Table
@@ -16,18 +16,9 @@ SHEAR = ["friction_angle", "shear_modulus"]
 
 
 @pytest.fixture
-def case(tmp_path):
-    (tmp_path / "model.toml").write_text(MODEL)
-    return read_case(tmp_path / "model.toml")
-
-
-@pytest.fixture
 def table(case):
     slip, load = np.linspace(0.05, 0.55, 12), np.tile([40.0, 70.0, 100.0], 4)
-    force = case.model(case.soil, Operating(slip=slip, load=load))
-    run = np.full(12, "a")
-    columns = {"run": run, "slip": slip, "load_N": load, "torque_Nm": force.torque}
-    return Table(columns, "log.csv", np.arange(2, 14))
+    return replace(torque_rows(case, {}, slip, load), source="log.csv", line=np.arange(2, 14))
 
 
 def changed(table, **columns):

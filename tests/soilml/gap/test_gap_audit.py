@@ -9,7 +9,6 @@ from gap_sets import case_of, driven
 from soilml.errors import InputError
 from soilml.gap import audit
 from soilml.gap.identifiability import (
-    NAMEABLE_SIGMA,
     identifiability,
     indistinguishable_classes,
 )
@@ -62,38 +61,6 @@ def test_classes_are_joined_by_a_common_member():
     }
     chain = {name: np.asarray(column) for name, column in chain.items()}
     assert indistinguishable_classes(chain, SOIL) == (("rate", "slope", "multipass"),)
-
-
-@pytest.fixture(scope="module")
-def found():
-    case = case_of()
-    design = driven(case, loads=(40.0, 90.0), slips=4)
-    return audit(case, design, costs={"other-speed": 4.0})
-
-
-def test_an_audit_lists_the_best_identified_first(found):
-    separating = [e.separating_snr for e in found.effects]
-    assert separating == sorted(separating, reverse=True) and len(separating) > 8
-    names = {e.name for e in found.effects}
-    assert names | set(found.untestable) == {
-        n for n, e in EFFECTS.items() if e.applies_to(case_of().model.gear)
-    }
-    assert not names & set(found.untestable) and "rate" in found.untestable
-    for group in found.classes:
-        assert len(group) > 1 and set(group) <= names
-
-
-def test_runs_to_add_gain_what_could_not_be_named(found):
-    nameable = {e.name for e in found.effects if e.separating_snr >= NAMEABLE_SIGMA}
-    assert found.added_runs
-    for run in found.added_runs:
-        assert not set(run.gained) & nameable
-        assert run.nameable == len(nameable) + len(run.gained)
-    gains = [len(run.gained) / (run.cost or 1.0) for run in found.added_runs]
-    assert gains == sorted(gains, reverse=True)
-    assert {run.cost for run in found.added_runs if run.kind == "other speed"} == {4.0}
-    rate = next(run for run in found.added_runs if run.kind == "other speed")
-    assert "rate" in rate.gained
 
 
 def test_an_audit_needs_noise():

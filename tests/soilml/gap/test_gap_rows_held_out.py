@@ -13,6 +13,7 @@ from soilml.gap.held_out import split_holdout
 from soilml.gap.run_options import run_options
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
+from soilml.quantities import SHEAR
 
 
 def table_of(runs, line=False):
@@ -57,16 +58,12 @@ def test_what_cannot_be_held_out_is_refused():
 
 def test_a_soil_parameter_is_free_or_fixed():
     case = case_of()
-    free = free_soil_parameters(case, ["cohesion"])
-    assert [f.path for f in free] == ["cohesion"]
-    fixed = fixed_parameters(case, free)
+    fixed = fixed_parameters(case, free_soil_parameters(case, ["cohesion"]))
     assert fixed[:7] == ["friction_angle", "shear_modulus", "kphi", "kc", "n", "a0", "a1"]
-    gear = [path for path in case.parameters() if path.startswith("gear.")]
-    assert fixed[7:] == gear and "gear.radius" in gear
-    alone = free_soil_parameters(replace(case, prior={}), None)
-    assert {f.path for f in alone} == {"cohesion", "friction_angle", "shear_modulus"}
-    one = replace(case, prior={"cohesion": case.prior["cohesion"]})
-    assert [f.path for f in free_soil_parameters(one, None)] == ["cohesion"]
+    assert fixed[7:] == [path for path in case.parameters() if path.startswith("gear.")]
+    for prior, expected in (({}, SHEAR), ({"cohesion": case.prior["cohesion"]}, ["cohesion"])):
+        free = free_soil_parameters(replace(case, prior=prior), None)
+        assert [f.path for f in free] == list(expected)
     with pytest.raises(InputError, match=r"^--free gear.radius is not a soil parameter"):
         free_soil_parameters(case, ["cohesion", "gear.radius"])
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from gap_sets import case_of, driven
 
@@ -24,42 +25,39 @@ def options(case=CASE, loads=(40.0, 60.0, 90.0), changed=None, **covariates):
 USUAL = [0.05, 0.15, 0.2, 0.3, 0.35, 0.45, 0.5, 0.6]
 
 
+#: By kind: slips, load, what it is called, and the covariate that a plain run beside it lacks.
+EVERY = {
+    "heavier": (USUAL, 135.0, "the same slips under 135 N", None),
+    "lighter": (USUAL, 24.0, "the same slips under 24 N", None),
+    "higher slip": (np.linspace(0.6, 0.8, 8).round(2), 60.0, "slips up to 0.8 under 60 N", None),
+    "low slip": (np.linspace(0.01, 0.12, 8).round(2), 60.0, "slips close to zero under 60 N", None),
+    "braking": (np.linspace(-0.4, -0.05, 8).round(2), 60.0, " under 60 N", None),
+    "reverse": (USUAL, 60.0, "the same slips in reverse under 60 N", ("speed", -0.05)),
+    "other speed": (
+        USUAL, 60.0, "the same slips ten times as fast, at 0.5 m/s, under 60 N", ("speed", 0.5)
+    ),
+    "second pass": (
+        USUAL, 60.0, "the same slips again in the same rut under 60 N", ("pass_number", 2.0)
+    ),
+    "slip angle": (
+        USUAL, 60.0, "the wheel at a slip angle of 0.2 rad under 60 N", ("slip_angle", 0.2)
+    ),
+}  # fmt: skip
+
+
 def test_every_kind_of_run():
     found = options()
-    assert list(found) == [
-        *("heavier", "lighter", "higher slip", "low slip", "braking", "reverse"),
-        *("other speed", "second pass", "slip angle"),
-    ]
-    slips = {kind: o.at.slip.tolist() for kind, o in found.items()}
-    loads = {kind: set(o.at.load.tolist()) for kind, o in found.items()}
-    for kind in ("heavier", "lighter", "reverse", "other speed", "second pass", "slip angle"):
-        assert slips[kind] == pytest.approx(USUAL)
-    assert slips["higher slip"] == pytest.approx([0.6, 0.63, 0.66, 0.69, 0.71, 0.74, 0.77, 0.8])
-    assert slips["low slip"] == pytest.approx([0.01, 0.03, 0.04, 0.06, 0.07, 0.09, 0.1, 0.12])
-    assert slips["braking"] == pytest.approx([-0.4, -0.35, -0.3, -0.25, -0.2, -0.15, -0.1, -0.05])
-    assert loads["heavier"] == {135.0} and loads["lighter"] == {24.0}
-    for kind in set(found) - {"heavier", "lighter"}:
-        assert loads[kind] == {60.0}
-    assert found["higher slip"].text == "slips up to 0.8 under 60 N"
-    assert found["heavier"].text == "the same slips under 135 N" and not found["heavier"].plain
-
-
-def test_a_run_that_differs_by_a_covariate_has_a_plain_one_beside_it():
-    found = options()
-    covariates = {
-        "reverse": ("speed", -0.05),
-        "other speed": ("speed", 0.5),
-        "second pass": ("pass_number", 2.0),
-        "slip angle": ("slip_angle", 0.2),
-    }
-    for kind, (name, value) in covariates.items():
-        assert getattr(found[kind].at, name).tolist() == [value] * 8
-        plain = found[kind].plain
-        assert getattr(plain, name) is None and plain.slip is not None
-    assert found["other speed"].text == "the same slips ten times as fast, at 0.5 m/s, under 60 N"
-    assert found["second pass"].text == "the same slips again in the same rut under 60 N"
-    assert found["slip angle"].text == "the wheel at a slip angle of 0.2 rad under 60 N"
-    assert found["reverse"].text == "the same slips in reverse under 60 N"
+    assert list(found) == list(EVERY)
+    for kind, (slips, load, text, covariate) in EVERY.items():
+        run = found[kind]
+        assert run.at.slip == pytest.approx(np.asarray(slips))
+        assert set(run.at.load.tolist()) == {load} and text in run.text
+        if covariate is None:
+            assert not run.plain
+            continue
+        name, value = covariate
+        assert getattr(run.at, name).tolist() == [value] * 8
+        assert getattr(run.plain, name) is None and run.plain.slip is not None
 
 
 def test_covariates_of_the_driven_rows_are_kept():

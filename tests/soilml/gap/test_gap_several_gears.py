@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gap_sets import case_of
+from gap_sets import MODEL, case_of
 from remarked import remarked
 
 from soilml import Operating, identify
@@ -32,18 +32,7 @@ type = "wheel"
 radius = 0.15
 width = 0.12
 """
-REST = """\
-[soil]
-name = "wong1989/dry_sand"
-[soil.prior]
-cohesion = [0.0, 3000.0]
-friction_angle = [0.3, 0.8]
-shear_modulus = [0.005, 0.04]
-[noise]
-torque_Nm = "1 %"
-drawbar_pull_N = "1 % + 0.2"
-sinkage_m = "1 %"
-"""
+REST = MODEL[MODEL.index("[soil]") :]
 LUGS = '[[gears.lugged.effect]]\nname = "grousers"\nheight = 0.012\n'
 
 

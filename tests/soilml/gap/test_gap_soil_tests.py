@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bevameter_tables import KC, KPHI, PHI, C, N, plates, shear
+from gap_sets import case_of
 from remarked import remarked
 
-from soilml import Case, Model, Operating, Table, Wheel, soil
+from soilml import Model, Operating, Table, Wheel, soil
 from soilml.config.measurement_noise import Noise
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.least_squares import SoilTestTerms
@@ -21,23 +23,11 @@ from soilml.remarks import texts
 pytestmark = pytest.mark.slow
 
 SAND = soil("wong1989/dry_sand")
-KNOWN = {
-    "kc": SAND.kc,
-    "kphi": SAND.kphi,
-    "n": SAND.n,
-    "cohesion": SAND.cohesion,
-    "friction_angle": SAND.friction_angle,
-}
-CASE = Case(
-    Model(Wheel(radius=0.15, width=0.12)),
-    SAND,
-    {
-        "cohesion": Prior(0.0, 3000.0),
-        "friction_angle": Prior(0.3, 0.8),
-        "shear_modulus": Prior(0.005, 0.05),
-        "kphi": Prior(1e5, 1e7, log=True),
-    },
-    {"torque_Nm": Noise(share=0.02), "sinkage_m": Noise(share=0.03)},
+KNOWN = {name: getattr(SAND, name) for name in ("kc", "kphi", "n", "cohesion", "friction_angle")}
+CASE = replace(
+    case_of(),
+    prior=case_of().prior | {"kphi": Prior(1e5, 1e7, log=True)},
+    noise={"torque_Nm": Noise(share=0.02), "sinkage_m": Noise(share=0.03)},
 )
 SLIP, LOAD = np.tile(np.linspace(0.05, 0.6, 7), 3), np.repeat([40.0, 70.0, 120.0], 7)
 
@@ -128,37 +118,19 @@ def test_terms_of_a_fit_are_derivatives_of_deviations():
 
 
 def test_bevameter_hands_its_tests_on():
-    z, size = np.tile(np.linspace(0.005, 0.04, 8), 2), np.repeat([0.05, 0.1], 8)
-    plates = Table(
-        {
-            "test": np.repeat(["small", "large"], 8),
-            "plate_radius_m": size,
-            "sinkage_m": z,
-            "pressure_Pa": (SAND.kc / size + SAND.kphi) * z**SAND.n,
-        }
-    )
-    sigma, j = np.repeat([4e3, 8e3, 12e3], 10), np.tile(np.linspace(0.005, 0.15, 10), 3)
-    strength = SAND.cohesion + sigma * np.tan(SAND.friction_angle)
-    shear = Table(
-        {
-            "test": np.repeat(["p", "q", "r"], 10),
-            "normal_stress_Pa": sigma,
-            "shear_displacement_m": j,
-            "shear_stress_Pa": strength * (1.0 - np.exp(-j / SAND.shear_modulus)),
-        }
-    )
+    known = {"kc": KC, "kphi": KPHI, "n": N, "cohesion": C, "friction_angle": PHI}
     earlier = ShearStrength(normal_stress=1e3, strength=1e3, scatter=0.1)
-    result = bevameter(plates, shear, CASE)
+    result = bevameter(plates(repeats=1), shear(repeats=1), CASE)
     case = updated_soil(replace(CASE, soil_tests=(earlier,)), result)
     plate, shear_test = case.soil_tests
     assert plate.plate_width == CASE.model.gear.width
-    assert abs(float(plate.deviation(KNOWN))) < 0.05
-    assert abs(float(shear_test.deviation(KNOWN))) < 0.05
-    assert shear_test.normal_stress == pytest.approx(8e3)
+    assert abs(float(plate.deviation(known))) < 0.05
+    assert abs(float(shear_test.deviation(known))) < 0.05
+    assert shear_test.normal_stress == pytest.approx(35e3 / 3.0, rel=1e-5)
     assert plate.scatter >= 0.15  # the usual scatter of repeats
     assert result.as_json()["tests"][1]["strength"] == shear_test.strength
     narrow = replace(CASE, model=Model(Wheel(radius=0.15, width=0.3)))
-    one_size = Table({name: plates[name][:8] for name in plates.columns})
+    one_size = plates(sizes=(0.05,))
     assert bevameter(one_size, None, narrow).tests == ()
 
 

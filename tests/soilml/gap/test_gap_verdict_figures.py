@@ -6,17 +6,12 @@ import numpy as np
 import pytest
 
 from soilml import Operating
-from soilml.errors import InputError
 from soilml.fitting.readings import Readings
 from soilml.gap import checks
-from soilml.gap.results import NextRun
 from soilml.gap.run_options import (
     HIGHEST_SLIP,
-    LISTED,
     ROWS_PER_RUN,
-    check_costs,
     drivable_slips,
-    rank_by_cost,
 )
 from soilml.remarks import texts
 
@@ -78,23 +73,6 @@ def test_repeats_give_the_noise_by_their_degrees_of_freedom():
     assert noise == {} and "its repeated rows are equal" in notes[0].text
     known = stub(**vars(given) | {"std": np.ones(8)})
     assert checks.estimate_repeat_noise(known) == ({}, [])
-
-
-def test_runs_by_what_they_tell_per_cost():
-    runs = [NextRun(kind, kind, float(d), None) for d, kind in
-            ((6, "heavier"), (5, "braking"), (4, "reverse"))]  # fmt: skip
-    assert [run.kind for run in rank_by_cost(runs, {})] == ["heavier", "braking", "reverse"]
-    ranked = rank_by_cost(runs, {"heavier": 3.0, "reverse": 0.5})
-    assert [(run.kind, run.cost) for run in ranked] == [
-        ("reverse", 0.5),
-        ("braking", 1.0),
-        ("heavier", 3.0),
-    ]
-    assert len(rank_by_cost(runs * 4, {})) == LISTED
-    assert check_costs({"second-pass": 2, "heavier": 0.1}) == {"second pass": 2.0, "heavier": 0.1}
-    for cost in (0.0, -1.0, float("nan"), float("inf")):
-        with pytest.raises(InputError, match="needed is a number above zero"):
-            check_costs({"heavier": cost})
 
 
 @pytest.mark.parametrize(

@@ -85,26 +85,6 @@ def test_held_out_rows_change_only_their_own_figures(dug, holdout):
     assert report.gap[key].readings == 3 * back.sum()
 
 
-def test_held_out_runs_change_no_fit(dug):
-    """What is fitted, and which candidates are tried, does not depend on the held-out runs."""
-    case, table = dug
-    report = gap(case, table, effects=FEW, holdout="run", seed=3)
-    back = np.asarray([name in report.gap["held_out_runs"].description for name in table["run"]])
-    torque = np.where(back, 1.7, 1.0) * table["torque_Nm"]
-    changed = replace(table, columns=table.columns | {"torque_Nm": torque})
-    other = gap(case, changed, effects=FEW, holdout="run", seed=3)
-    assert other.probabilities == report.probabilities and other.soil_before == report.soil_before
-    assert other.variance_components == report.variance_components
-    assert other.remainder_probability == report.remainder_probability
-
-
-def test_the_named_effect_predicts_held_out_rows(dug):
-    report = gap(*dug, effects=FEW, holdout="load_N=140")
-    region = report.gap["held_out_region"]
-    assert region.description == "load_N=140, held out"
-    assert region.after < 0.25 * region.before
-
-
 def test_held_out_rows_without_known_noise_are_ignored(dug):
     table = dug[1]
     quiet = case_of(MODEL.replace('torque_Nm = "1 %"\n', ""))
@@ -165,11 +145,6 @@ def test_the_updated_model_makes_a_recipe(model, capsys):
     (model / "recipe.toml").write_text(text)
     assert main(["generate", str(model / "recipe.toml"), str(model / "data.parquet")]) == 0
     assert (model / "data.parquet").stat().st_size > 0
-
-
-def test_with_its_effect_in_the_model_nothing_is_missing_any_more(dug):
-    grown = case_of(MODEL + '[[effect]]\nname = "slip-sinkage"\nn1 = 0.4\n')
-    assert gap(grown, dug[1], effects=FEW).status == "no-gap"
 
 
 @pytest.mark.parametrize("before", ["", "import soilml.gap\n", "from soilml.gap import audit\n"])

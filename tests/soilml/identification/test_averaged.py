@@ -8,7 +8,6 @@ import pytest
 from datagen.recipe import read_recipe
 from soilml import Operating, Table, identify
 from soilml.config.measurement_noise import Discrepancy
-from soilml.errors import FitError
 from soilml.gap import gap
 from soilml.inference.search import Search
 from soilml.physics.effects.soil_changes import FrictionDrift
@@ -93,12 +92,6 @@ def test_noise_that_is_not_declared_is_that_of_the_residuals():
     fit = identify(replace(CASE, noise={}), rows({"torque_Nm": "torque"}))
     assert fit.method == "averaged" and holds(fit).all()
     assert "undeclared-noise" in {remark.code for remark in fit.warnings}
-
-
-def test_a_soil_that_carries_no_load_has_no_explanation():
-    table = Table({"slip": SLIP, "load_N": 1e3 * LOAD, "torque_Nm": LOAD})
-    with pytest.raises(FitError, match="no parameters in the prior carry"):
-        identify(CASE, table)
 
 
 @pytest.mark.slow

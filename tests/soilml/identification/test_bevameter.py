@@ -118,21 +118,12 @@ def test_ranges_of_shear_tests_contain_mean_and_next_place():
     assert 0.88 < np.mean(place) <= 1.0
 
 
-def test_more_samples_in_a_test_do_not_make_it_surer():
-    few, many = (
-        bevameter(plates(points=points, scatter=(0.2, 0.05))).estimates()["n"]
-        for points in (12, 500)
-    )
-    widths = [np.diff(e.mean_95)[0] for e in (few, many)]
-    assert widths[1] == pytest.approx(widths[0], rel=0.2)
+def test_more_tests_make_it_surer_and_more_samples_in_a_test_do_not():
+    def width(**drawn):
+        return np.diff(bevameter(plates(scatter=(0.2, 0.05), **drawn)).estimates()["n"].mean_95)[0]
 
-
-def test_more_tests_do():
-    few, many = (
-        bevameter(plates(repeats=repeats, scatter=(0.2, 0.05))).estimates()["n"]
-        for repeats in (2, 8)
-    )
-    assert np.diff(many.mean_95)[0] < 0.7 * np.diff(few.mean_95)[0]
+    assert width(points=500) == pytest.approx(width(points=12), rel=0.2)
+    assert width(repeats=8) < 0.7 * width(repeats=2)
 
 
 def test_one_plate_size_tells_k_for_its_width_alone(tmp_path):
@@ -141,13 +132,17 @@ def test_one_plate_size_tells_k_for_its_width_alone(tmp_path):
     assert "kc" not in found.estimates() and found.soil["kc"] == 0.0
     assert found.estimates()["k"].value == pytest.approx(KC / 0.08 + KPHI, rel=0.01)
     assert "one-plate-size" in codes(found)
-    # the narrower the wheel, the more the unknown share of kc widens the range, and upwards only
-    ranges = [
-        bevameter(table, case=model_file(tmp_path, width=w)).prior["kphi"] for w in (0.08, 0.02)
-    ]
-    assert ranges[1].lower == pytest.approx(ranges[0].lower, rel=1e-5)
-    assert ranges[1].upper == pytest.approx(4.0 * ranges[0].upper, rel=1e-5)
-    assert contains((ranges[1].lower, ranges[1].upper), KC / 0.02 + KPHI)
+    # the range at another width holds all from kphi = 0 to kc = 0
+    same, narrow, wide = (
+        bevameter(table, case=model_file(tmp_path, width=w)) for w in (0.08, 0.02, 0.16)
+    )
+    span = same.prior["kphi"]
+    for other, low, high in ((narrow, 1.0, 4.0), (wide, 0.5, 1.0)):
+        assert other.prior["kphi"].lower == pytest.approx(low * span.lower, rel=1e-3)
+        assert other.prior["kphi"].upper == pytest.approx(high * span.upper, rel=1e-3)
+        assert about(other.remarks, "another-width") == {"kphi"}
+    assert "another-width" not in codes(same)
+    assert contains((narrow.prior["kphi"].lower, narrow.prior["kphi"].upper), KC / 0.02 + KPHI)
 
 
 def test_two_plate_sizes_tell_k_at_the_width_of_the_wheel(tmp_path):
@@ -160,20 +155,41 @@ def test_two_plate_sizes_tell_k_at_the_width_of_the_wheel(tmp_path):
     assert contains((low, high), KC / 0.07 + KPHI)
 
 
-def test_one_normal_stress_shares_the_strength(tmp_path):
-    table, sigma = shear(stresses=(10e3,), repeats=4), 10e3
-    strength = C + sigma * np.tan(PHI)
-    alone = bevameter(shear=table)
-    assert alone.estimates()["shear_strength"].value == pytest.approx(strength, rel=0.01)
-    assert alone.soil["cohesion"] == 0.0
-    assert alone.soil["friction_angle"] == pytest.approx(np.arctan(strength / sigma), rel=0.01)
-    assert alone.prior["friction_angle"].lower < 0.01
-    assert "one-normal-stress" in codes(alone)
-    known = bevameter(shear=table, case=model_file(tmp_path))
-    span = known.prior["friction_angle"]
-    assert (known.prior["cohesion"].lower, known.prior["cohesion"].upper) == (0.0, 2000.0)
-    assert contains((span.lower, span.upper), PHI)
-    assert span.lower > np.arctan((0.7 * strength - 2000.0) / sigma)
+@pytest.mark.parametrize(
+    ("given", "own_prior"),
+    [
+        (None, None),
+        (1000.0, (500.0, 1500.0)),
+        (1000.0, (500.0, 20000.0)),
+        (15000.0, (0.0, 20000.0)),  # above the whole strength
+        (1000.0, None),
+    ],
+)
+def test_one_normal_stress_shares_the_strength(tmp_path, given, own_prior):
+    table, sigma = shear(stresses=(10e3,), repeats=4, scatter=0.02), 10e3
+    case = model_file(
+        tmp_path, prior=f"cohesion = {list(own_prior)}" if own_prior else "n = [1, 2]"
+    )
+    case = None if given is None else case.with_values({"cohesion": given})
+    found = bevameter(shear=table, case=case)
+    strength, soil = found.estimates()["shear_strength"], found.soil
+    assert strength.value == pytest.approx(C + sigma * np.tan(PHI), rel=0.05)
+    assert "one-normal-stress" in codes(found)
+    weakest, strongest = strength.another_place_95
+    lowest, highest = own_prior or (0.0, strongest)
+    highest = min(highest, strongest)
+    assert soil["cohesion"] == pytest.approx(min(given or 0.0, highest), rel=1e-5)
+    tangent = max(strength.value - soil["cohesion"], 0.0) / sigma
+    assert np.tan(soil["friction_angle"]) == pytest.approx(tangent, rel=1e-5, abs=1e-9)
+    ends = {"cohesion": (lowest, highest)}
+    tangents = [max(weakest - highest, 0.0) / sigma, max(strongest - lowest, 0.0) / sigma]
+    ends["friction_angle"] = np.arctan(tangents)
+    for name, span in ends.items():
+        prior = found.prior[name]
+        assert (prior.lower, prior.upper) == pytest.approx(tuple(span), rel=2e-3, abs=1e-3)
+    whose = "the model file's" if own_prior else "0 to the whole strength"
+    (said,) = [r.text for r in found.remarks if r.code == "assumed-range"]
+    assert whose in said
 
 
 def test_a_curved_failure_line_is_said_and_widens_the_ranges():
@@ -264,36 +280,46 @@ def test_odd_units_are_remarked_on():
         assert about(bevameter(shear=Table(wrong)).remarks, "doubtful-unit") == about_them
 
 
-MISTAKES = {
-    "no plate": ("plate_radius_m", None, "the size of the plate is missing"),
-    "no pressure": ("pressure_Pa", None, "pressure_Pa or load_N"),
-    "nothing measured": ("pressure_Pa", np.nan, "more samples with growing sinkage"),
-    "no sinkage": ("sinkage_m", None, "sinkage_m is missing"),
-}
+MISTAKES = [
+    (plates, "plate_radius_m", None, "the size of the plate is missing"),
+    (plates, "pressure_Pa", None, "pressure_Pa or load_N"),
+    (plates, "pressure_Pa", np.nan, "more samples with growing sinkage"),
+    (plates, "sinkage_m", None, "sinkage_m is missing"),
+    (shear, "normal_stress_Pa", None, "column normal_stress_Pa is missing"),
+    (shear, "shear_displacement_m", None, "column shear_displacement_m is missing"),
+    (shear, "shear_stress_Pa", np.nan, "samples with a displacement and a shear"),
+    (shear, "normal_stress_Pa", np.nan, "no normal stress above zero"),
+]
 
 
-@pytest.mark.parametrize(("key", "value", "said"), MISTAKES.values(), ids=MISTAKES)
-def test_plate_tables_without_a_curve_are_refused(key, value, said):
-    columns = dict(plates().columns)
-    if value is None:
-        del columns[key]
-    else:
-        columns[key] = np.full(len(columns[key]), value)
+@pytest.mark.parametrize(("tests", "key", "value", "said"), MISTAKES)
+def test_tables_without_a_curve_are_refused(tests, key, value, said):
+    table = tests(repeats=12)
+    columns = {name: table[name] for name in table.columns if name != key}
+    if value is not None:
+        columns[key] = np.full(len(table), value)
+    kind = "plates" if tests is plates else "shear"
     with pytest.raises(TableError, match=said):
-        bevameter(Table(columns))
+        bevameter(**{kind: Table(columns)})
 
 
-def test_shear_tables_without_a_curve_are_refused():
-    columns = shear().columns
-    with pytest.raises(TableError, match="column normal_stress_Pa is missing"):
-        bevameter(shear=Table({k: v for k, v in columns.items() if k != "normal_stress_Pa"}))
-    many = {k: np.repeat(v, 6) for k, v in columns.items() if k != "shear_displacement_m"}
-    with pytest.raises(TableError, match="column shear_displacement_m is missing"):
-        bevameter(shear=Table(many))
-    blank = np.full(len(columns["test"]), np.nan)
-    with pytest.raises(TableError, match="samples with a displacement and a shear"):
-        bevameter(shear=Table(columns | {"shear_stress_Pa": blank}))
-    with pytest.raises(TableError, match="no normal stress above zero"):
-        bevameter(shear=Table(columns | {"normal_stress_Pa": blank}))
+def test_no_tests_are_refused():
     with pytest.raises(InputError, match="no tests"):
         bevameter()
+
+
+def test_json_of_the_result_holds_every_test():
+    found = bevameter(plates(repeats=1), shear(repeats=1))
+    content = found.as_json()
+    assert list(content["estimates"]) == list(found.estimates())
+    entry = content["plate_tests"][1]
+    assert (entry["test"], entry["plate_m"]) == ("0.1_0", 0.1)
+    assert entry["n"] == pytest.approx(N, rel=1e-3)
+    assert entry["k"] == pytest.approx(KC / 0.1 + KPHI, rel=1e-3) and entry["misfit"] < 1e-6
+    entry = content["shear_tests"][2]
+    assert (entry["test"], entry["normal_stress_Pa"]) == ("20000_0", 20e3)
+    assert entry["strength_Pa"] == pytest.approx(C + 20e3 * np.tan(PHI), rel=0.01)
+    assert entry["shear_modulus_m"] == pytest.approx(K, rel=0.02)
+    assert content["soil"] == found.soil
+    assert content["remarks"] == [r.as_json() for r in found.remarks]
+    assert bevameter(plates()).as_json()["shear_tests"] == []

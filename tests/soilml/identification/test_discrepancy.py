@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from remarked import remarked
 
-from soilml import Operating, identify, read_case
+from soilml import Operating, identify
 from soilml.config.measurement_noise import Discrepancy, Noise, range_with_zero
 from soilml.config.remainder import Remainder, RemainderPart
 from soilml.experiment_design import samples_of_prior
@@ -20,11 +20,6 @@ TRUTH = {"cohesion": 812.0, "friction_angle": 0.6, "shear_modulus": 0.012}
 COLUMNS = {"torque_Nm": "torque", "drawbar_pull_N": "drawbar_pull", "sinkage_m": "sinkage"}
 SLIPS, LOADS = np.tile(np.linspace(0.05, 0.6, 6), 3), np.repeat([40.0, 70.0, 120.0], 6)
 USUAL = {key: Discrepancy(share=0.02) for key in COLUMNS}
-
-
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
 
 
 def smooth_function(rng, slip, load):

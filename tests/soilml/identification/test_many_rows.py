@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from measured_rows import measured, two_gears, with_model
+from conftest import THREE_CHANNEL_MODEL
+from gap_sets import case_of
+from measured_rows import measured, two_gears
 from remarked import remarked
 
 from soilml import identification, identify
@@ -21,8 +23,8 @@ ROWS = 2400
 
 
 @pytest.fixture
-def case(tmp_path):
-    return with_model(tmp_path)
+def case():
+    return case_of(THREE_CHANNEL_MODEL)
 
 
 @pytest.fixture
@@ -94,20 +96,6 @@ def test_residuals_within_the_cells_count_as_misfit(case, condensing):
     fit = identify(case, Table(columns), method="nonlinear")
     assert fit.misfit == pytest.approx((0.06**2 + 0.02**2) / 0.02**2, rel=0.1)
     assert remarked(fit.warnings, "times the declared noise")
-
-
-def test_rows_without_equilibrium_stay(case, condensing):
-    table = measured(case, np.random.default_rng(16), ROWS)
-    load = np.where(np.arange(ROWS) == 5, 1e6, table["load_N"])
-    columns = {name: table[name] for name in table.columns} | {"load_N": load}
-    data = usable_readings(case, Table(columns))
-    known = case.with_values({"cohesion": 500.0})
-    cell = np.arange(ROWS) // 20
-    few = condensing_rows._condensed_at(known, data, *condensing_rows._residuals(known, data), cell)
-    assert len(few.row_slip) == ROWS // 20 + 1
-    assert few.row_load[-1] == 1e6
-    first = few.measured[few.channel == 0]
-    assert first[-1] == data.measured[data.channel == 0][5]
 
 
 def test_closed_forms_refuse_more_rows_than_they_hold(case, monkeypatch):

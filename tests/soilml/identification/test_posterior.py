@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gap_sets import MODEL, case_of, driven
+from measured_rows import torque_rows
 from remarked import remarked
 
-from soilml import Operating, identify, read_case
+from soilml import Operating, identify
 from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError
 from soilml.fitting.coordinates import select_free
@@ -22,19 +23,7 @@ SLIPS = np.tile(np.linspace(0.1, 0.6, 4), 2)
 LOADS = np.repeat([40.0, 100.0], 4)
 
 
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
-
-
-def measured(case, truth, slip, load, seed):
-    true = case.with_values(truth)
-    force = true.model(true.soil, Operating(slip=slip, load=load))
-    noise = case.noise["torque_Nm"].std(force.torque)
-    torque = force.torque + noise * np.random.default_rng(seed).standard_normal(len(slip))
-    return Table(
-        {"run": np.full(len(slip), "a"), "slip": slip, "load_N": load, "torque_Nm": torque}
-    )
+TRUTH = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
 
 
 def drawn(case, rng):
@@ -59,9 +48,8 @@ def test_sampling_finds_the_moments_and_the_evidence_of_a_bent_ridge():
 
 @pytest.mark.slow
 def test_the_posterior_is_that_of_brute_force_on_a_grid(case):
-    truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
-    case = case.with_values(truth)
-    table = measured(case, truth, SLIPS, LOADS, seed=3)
+    case = case.with_values(TRUTH)
+    table = torque_rows(case, TRUTH, SLIPS, LOADS, noise=0.02, seed=3)
     fit = identify(case, table, ["cohesion", "friction_angle"], "posterior")
     ends = [case.prior[name] for name in fit.names]
     axis = (np.arange(160) + 0.5) / 160
@@ -88,7 +76,7 @@ def test_truths_stand_anywhere_in_their_posteriors_alike_and_no_fit_is_nearer(ca
     inside, error, other = [], [], []
     for k in range(60):
         truth = drawn(case, rng)
-        table = measured(case, truth, SLIPS[:4], LOADS[:4], seed=k)
+        table = torque_rows(case, truth, SLIPS[:4], LOADS[:4], noise=0.02, seed=k)
         values = np.asarray([truth[name] for name in case.prior])
         fit = identify(case, table, None, "posterior")
         inside.append((fit.interval[0] <= values) & (values <= fit.interval[1]))
@@ -99,8 +87,7 @@ def test_truths_stand_anywhere_in_their_posteriors_alike_and_no_fit_is_nearer(ca
 
 
 def test_what_rows_do_not_tell_comes_out_as_the_prior_and_is_said(case):
-    truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
-    table = measured(case, truth, np.asarray([0.2]), np.asarray([60.0]), seed=1)
+    table = torque_rows(case, TRUTH, np.asarray([0.2]), np.asarray([60.0]), noise=0.02, seed=1)
     fit = identify(case, table, None, "posterior")
     assert fit.remaining_fraction["cohesion"] > 0.8
     assert remarked(fit.warnings, "cohesion is not identified")
@@ -111,8 +98,7 @@ def test_what_rows_do_not_tell_comes_out_as_the_prior_and_is_said(case):
 
 @pytest.mark.slow
 def test_a_model_that_lacks_something_is_said_to(case):
-    truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
-    table = measured(case, truth, SLIPS, LOADS, seed=1)
+    table = torque_rows(case, TRUTH, SLIPS, LOADS, noise=0.02, seed=1)
     measured_well, shaken = (
         table,
         table["torque_Nm"] * np.tile([0.9, 1.1], 4),
@@ -124,8 +110,7 @@ def test_a_model_that_lacks_something_is_said_to(case):
 
 
 def test_noise_that_nobody_declared_is_asked_for(case):
-    truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
-    table = measured(case, truth, SLIPS, LOADS, seed=1)
+    table = torque_rows(case, TRUTH, SLIPS, LOADS, noise=0.02, seed=1)
     with pytest.raises(FitError, match="declare it in"):
         identify(type(case)(case.model, case.soil, case.prior), table, None, "posterior")
 
@@ -133,9 +118,8 @@ def test_noise_that_nobody_declared_is_asked_for(case):
 @pytest.mark.slow
 def test_many_rows_leave_a_normal_posterior_about_the_least_squares(case):
     rng = np.random.default_rng(2)
-    truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
     slip, load = rng.uniform(0.05, 0.6, 700), rng.choice([40.0, 70.0, 100.0], 700)
-    table = measured(case, truth, slip, load, seed=6)
+    table = torque_rows(case, TRUTH, slip, load, noise=0.02, seed=6)
     fit = identify(case, table, None, "posterior")
     least_squares = identify(case, table, None, "nonlinear")
     # so many rows determine the parameters that the posterior is normal about the least squares
@@ -145,9 +129,8 @@ def test_many_rows_leave_a_normal_posterior_about_the_least_squares(case):
 
 @pytest.mark.slow
 def test_noise_of_slip_is_linearised_where_the_posterior_is(case):
-    truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
     case = replace(case, noise=case.noise | {"slip": Noise(constant=0.02)})
-    table = measured(case, truth, SLIPS, LOADS, seed=7)
+    table = torque_rows(case, TRUTH, SLIPS, LOADS, noise=0.02, seed=7)
     fit = identify(case, table, None, "posterior")
     exact = identify(
         replace(case, noise={"torque_Nm": Noise(share=0.02)}), table, None, "posterior"

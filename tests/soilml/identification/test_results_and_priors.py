@@ -1,48 +1,15 @@
 """Results, priors of free parameters, warnings, and a parameter that a method holds fixed."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from channel_readings import channel_readings
 
-from soilml import identify, read_case
-from soilml.errors import FitError, InputError
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.misfit import misfit_limit
-from soilml.identification.fit import Fit, with_warnings
-from soilml.identification.linear import with_fixed_parameter
-from soilml.io.table import Table
+from soilml.identification.trained_estimator import SAME_PRIOR, narrower_priors
 from soilml.numerics.prior import Prior
-from soilml.physics.operating_point import Operating
-from soilml.remarks import Remark, texts
-
-COVARIANCE = np.asarray([[4.0, 1.2], [1.2, 1.0]])
-
-
-def fit_of(**changes):
-    fit = Fit(
-        method="nonlinear",
-        names=("cohesion", "friction_angle"),
-        units=("Pa", "rad"),
-        values=np.asarray([10.0, 0.5]),
-        covariance=COVARIANCE,
-        warnings=(Remark("first", "first"),),
-        rows_used=3,
-        remaining_fraction={"cohesion": 0.3, "friction_angle": 0.2},
-    )
-    return replace(fit, **changes)
-
-
-def rows_of(load=(30.0, 60.0, 120.0), **changes):
-    n = len(load)
-    at = Operating(slip=np.linspace(0.1, 0.5, n), load=np.asarray(load))
-    return channel_readings(at, {"torque": (np.ones(n), 0.1)}, **changes)
-
-
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
 
 
 def test_priors_that_nobody_gave_are_those_of_natural_soils(case):
@@ -63,56 +30,6 @@ def test_priors_that_nobody_gave_are_those_of_natural_soils(case):
     assert [f.path for f in select_free(case, None)] == list(case.prior)
 
 
-def test_unknown_or_no_parameters_are_refused(case):
-    with pytest.raises(InputError, match="nothing to identify"):
-        select_free(replace(case, prior={}), None)
-    with pytest.raises(InputError, match=r"'cohesoin'.*cohesion.*this model has: "):
-        select_free(case, ["cohesoin"])
-
-
-def warned(case, fit, data, u=(0.5, 0.5), *, excess=False, undeclared=False):
-    free = select_free(case, list(fit.names))
-    found = with_warnings(
-        fit, case, data, free, np.asarray(u), excess_residuals=excess, undeclared=undeclared
-    )
-    assert found.warnings[0].code == "first"
-    return tuple(texts(found.warnings[1:]))
-
-
-def test_a_parameter_that_is_held_fixed_widens_the_others_by_its_prior(case):
-    """For a linear solution the covariance grows by the prior's variance times its square."""
-
-    def solve(one):
-        c = float(one.soil.cohesion)
-        values = np.asarray([c, 0.5 + 2e-4 * c])
-        return fit_of(values=values, covariance=np.diag([1.0, 1e-4]))
-
-    known = replace(case, soil=replace(case.soil, cohesion=200.0))
-    known = replace(known, prior={"cohesion": Prior(0.0, 1200.0)})
-    found = with_fixed_parameter(known, "cohesion", solve)
-    # a uniform prior has the variance (b - a)^2 / 12; the value is 400 Pa below its middle
-    slope = np.asarray([1.0, 2e-4])
-    spread = 1200.0**2 / 12.0 + 400.0**2
-    expected = np.diag([1.0, 1e-4]) + spread * np.outer(slope, slope)
-    np.testing.assert_allclose(found.covariance, expected, rtol=1e-9)
-    assert texts(found.warnings) == [
-        "cohesion is fixed at 200; the width of its prior is propagated into std",
-        "first",
-    ]
-    exact = with_fixed_parameter(replace(known, prior={}), "cohesion", solve)
-    assert "treated as exact" in exact.warnings[0].text
-    np.testing.assert_array_equal(exact.covariance, np.diag([1.0, 1e-4]))
-
-    def fails_above(one):
-        if float(one.soil.cohesion) > 600.0:
-            raise FitError("no")
-        return solve(one)
-
-    part = with_fixed_parameter(known, "cohesion", fails_above)
-    below = 600.0 - 1200.0 / 12.0**0.5 - 200.0
-    np.testing.assert_allclose(part.covariance[0, 0], 1.0 + 0.5 * below**2, rtol=1e-9)
-
-
 def test_noise_alone_exceeds_the_limit_of_the_misfit_once_in_a_thousand():
     from scipy.stats import chi2
 
@@ -121,10 +38,26 @@ def test_noise_alone_exceeds_the_limit_of_the_misfit_once_in_a_thousand():
     assert misfit_limit(0) == np.inf
 
 
-def test_methods_are_checked_before_anything_is_read(case):
-    table = Table({"slip": np.zeros(1), "load_N": np.ones(1), "torque_Nm": np.ones(1)})
-    with pytest.raises(InputError, match="no method 'bayes'; there are: averaged, nonlinear"):
-        identify(case, table, method="bayes")
-    several = replace(case, gears={"a": case.model})
-    with pytest.raises(InputError, match="newton method is for one gear"):
-        identify(several, table, method="newton")
+@pytest.mark.parametrize(
+    ("own", "used"),
+    [
+        (Prior(0.0, 3000.0), None),  # the file's
+        (Prior(500.0, 3000.0), (500.0, 3000.0)),
+        (Prior(0.0, 2500.0), (0.0, 2500.0)),
+        (Prior(30.0, 2970.0), None),  # within a hundredth: the same
+        (Prior(0.0, 4000.0), None),  # wider
+        (Prior(-500.0, 2000.0), None),  # only one end lies in the file's
+        (Prior(1000.0, 4000.0), None),
+        (Prior(-30.0, 2000.0), (0.0, 2000.0)),  # within the slack, cut to the file's
+        (Prior(1000.0, 3030.0), (1000.0, 3000.0)),
+        (Prior(1.0, 2000.0, log=True), None),
+    ],
+)
+def test_a_narrower_prior_is_used_where_it_lies_in_that_of_the_file(own, used):
+    assert SAME_PRIOR == 0.02
+    file = SimpleNamespace(
+        names=("cohesion",), prior=SimpleNamespace(lower=[0.0], upper=[3000.0])
+    )  # fmt: skip
+    found = narrower_priors(file, SimpleNamespace(prior={"cohesion": own}))
+    assert found == ({} if used is None else {"cohesion": used})
+    assert narrower_priors(file, SimpleNamespace(prior={})) == {}

@@ -1,9 +1,13 @@
-"""Importance sampling where a similar density is known."""
+"""Importance sampling, resampling, and bands of quantiles."""
 
 import numpy as np
 import pytest
 
 from soilml.numerics.importance_sampling import importance_sample
+from soilml.numerics.quantiles import (
+    quantile_band,
+    systematic_resampling,
+)
 
 
 def middle(p, std):
@@ -46,3 +50,22 @@ def test_few_samples_for_each_component_do_not_cost_the_tails():
         spread = np.sqrt(found.mean((found.u - found.mean(found.u)) ** 2))
         ratios.append(spread / width / expected)
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.022)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.5, 0.99])
+def test_each_sample_is_drawn_in_proportion_to_its_weight(offset):
+    weights = np.random.default_rng(1).random(500) ** 4
+    weights /= weights.sum()
+    times = np.bincount(systematic_resampling(weights, 900, offset), minlength=500)
+    assert times.sum() == 900
+    assert (np.abs(times - 900 * weights) < 1.0).all()
+
+
+def test_a_band_ignores_draws_that_are_not_a_number():
+    draws = np.tile(np.arange(101.0)[:, None], (1, 3))
+    draws = np.vstack([draws, np.full((20, 3), np.nan)])
+    draws[:, 2] = np.nan
+    band = quantile_band(draws)
+    np.testing.assert_array_equal(band.lower, [5.0, 5.0, np.nan])
+    np.testing.assert_array_equal(band.width, [90.0, 90.0, np.nan])
+    assert band.middle[0] == 50.0

@@ -8,14 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from soilml import EFFECTS, Midstance, Operating, Track, Wheel, soil
+from soilml import EFFECTS, Midstance, Operating, Track, soil
 from soilml.errors import InputError
 from soilml.parameters import check, declared
-from soilml.physics.effects.base import KINDS
 from soilml.physics.gears import GEARS
-from soilml.physics.gears.rigid_wheel import WheelArc
-from soilml.physics.operating_point import COVARIATES
-from soilml.physics.sinkage_estimate import SinkageEstimate
 
 #: Bounds and defaults that files of users rely on: one that becomes narrower refuses files that
 #: were valid, and another default changes what they mean.
@@ -59,42 +55,3 @@ def _with(node, field, value):
     changed = replace(node)
     object.__setattr__(changed, field, value)
     return changed
-
-
-@pytest.mark.parametrize("name", EFFECTS)
-def test_a_card_names_a_size_within_bounds_and_signs(name):
-    card, parameters = EFFECTS[name].about, declared(EFFECTS[name])
-    assert set(card.signs.values()) <= {-1, 1}
-    assert set(card.signs) <= {"torque", "drawbar_pull", "sinkage"}
-    for field, size in card.reference.items():
-        assert parameters[field].lower <= size <= parameters[field].upper
-    assert (card.calibration is None) == (card.kind not in ("rig", "sensor"))
-    assert card.kind in KINDS and all(len(t) > 5 for t in (card.text, card.source, card.isolate))
-    assert bool(card.varied_dimension) <= bool(card.varied)
-    assert set(card.needs) <= set(COVARIATES)
-    if card.calibration is not None:
-        # a fault that a checked setup still has is not larger than one that matters
-        assert 0.0 < card.calibration <= abs(card.reference[card.size])
-
-
-def test_effects_of_running_gear_are_for_their_gear():
-    """What a card says of wheels and tracks is what `applies_to` says."""
-    wheel, track = Wheel(radius=0.1, width=0.1), Track(radius=0.1, width=0.08, base=0.6)
-    by_gear = {
-        "track-grousers": (False, True),
-        "grousers": (True, False),
-        "wheel-flexibility": (True, False),
-        "torque-gain": (True, True),
-    }
-    for name, expected in by_gear.items():
-        assert tuple(EFFECTS[name].applies_to(gear) for gear in (wheel, track)) == expected
-    varied = {name: e.about.varied_dimension for name, e in EFFECTS.items() if e.about.varied}
-    assert varied["small-wheel-stiffness"] == "radius"
-
-
-def test_what_is_not_given_changes_nothing():
-    one = np.ones(1)
-    assert not SinkageEstimate(one, one).nearest
-    rim = WheelArc(one, 0 * one, 0.5 * one, one, 0.1, 0.1, 0.1, 0.1)
-    assert rim.travelled(np.asarray([0.25]), "displacement-sign") == pytest.approx(0.75)
-    assert Wheel(radius=0.1, width=0.1).braking == "displacement-sign"

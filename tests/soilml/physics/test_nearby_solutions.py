@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from soilml import EFFECTS, Model, Operating, Status, Wheel, soil
-from soilml.physics.contact import Force
-from soilml.physics.equilibrium import without_unsolved
+from soilml import EFFECTS, Model, Operating, Wheel, soil
 from soilml.physics.forces import apply_input_effects, forces_at_sinkage
 from soilml.physics.linear_response import linear_response
 from soilml.physics.load_case import LoadCase
@@ -16,14 +14,6 @@ from soilml.physics.model import flattened
 SAND = soil("wong1989/dry_sand")
 WHEEL = Wheel(radius=0.15, width=0.12)
 CHANNELS = ("torque", "drawbar_pull", "sinkage", "entry_angle")
-
-
-def test_rows_without_equilibrium_are_blank_but_for_load_and_status():
-    one = np.ones(2)
-    force = without_unsolved(Force(one, one, one, one, one, np.asarray([0, Status.TOO_HEAVY])))
-    for name in CHANNELS:
-        np.testing.assert_array_equal(getattr(force, name), [1.0, np.nan])
-    assert force.load.tolist() == [1.0, 1.0]
 
 
 EFFECT_LISTS = [

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from reference import equilibrium, stresses
+from reference import equilibrium, row_of, stresses
 from scipy.integrate import quad
 
 from soilml import Model, Operating, Wheel, soil
@@ -19,8 +19,7 @@ AT = Operating(slip=0.2, load=490.5)
 
 def test_it_is_one_less_the_resistance_over_the_thrust_by_quadrature():
     ground = soil("comin2017/es-3")
-    row = {"radius": 0.15, "width": 0.18, "slip": 0.2, "load": 490.5}
-    row |= {name: getattr(ground, name) for name in ground.__dataclass_fields__}
+    row = row_of(ground, radius=0.15, width=0.18, slip=0.2, load=490.5)
     theta1, _, _ = equilibrium(row)
     peak = (ground.a0 + ground.a1 * 0.2) * theta1
     ends = [peak, theta1 - 0.1, theta1 - 0.02]

@@ -23,51 +23,6 @@ def batch(slip, load, ground=SAND, gear=WHEEL, effects=()):
     return flattened(LoadCase(gear, ground, Operating(slip=slip, load=load), effects))[0]
 
 
-def box(count=60, seed=0):
-    rng = np.random.default_rng(seed)
-    ground = replace(
-        SAND,
-        cohesion=rng.uniform(0.0, 3000.0, count),
-        friction_angle=rng.uniform(0.3, 0.8, count),
-        shear_modulus=rng.uniform(0.002, 0.05, count),
-        kphi=np.exp(rng.uniform(np.log(2e5), np.log(5e6), count)),
-        n=rng.uniform(0.6, 1.4, count),
-    )
-    return batch(rng.uniform(0.02, 0.9, count), rng.uniform(10.0, 120.0, count), ground)
-
-
-def test_the_three_searches_find_the_same_sinkage():
-    case = box()
-    found = [
-        search(case)
-        for search in (
-            sinkage_search._solve_from_coarse,
-            sinkage_search._solve_by_secant,
-            sinkage_search._solve_by_scan,
-        )
-    ]
-    carried = load_at_sinkage(case, found[1][0].sinkage) / case.at.load
-    np.testing.assert_allclose(carried, 1.0, atol=1e-7)
-    for force, answered in found:
-        assert answered.all() and not force.status.any()
-        for name in ("sinkage", "torque", "drawbar_pull", "entry_angle", "load"):
-            reference = getattr(found[1][0], name)
-            np.testing.assert_allclose(getattr(force, name), reference, rtol=1e-6, atol=1e-7)
-
-
-def test_a_load_above_that_at_the_hub_is_too_heavy_and_one_below_is_not():
-    at_hub = float(load_at_sinkage(batch([0.3], 60.0), np.asarray([0.15]))[0])
-    case = batch(np.full(3, 0.3), at_hub * np.asarray([0.5, 0.999, 1.001]))
-    force, heavy = sinkage_search._too_heavy(case)
-    assert heavy.tolist() == [False, False, True]
-    assert force.status.tolist() == [0, 0, Status.TOO_HEAVY]
-    np.testing.assert_allclose(force.load, at_hub, rtol=1e-12)
-    np.testing.assert_allclose(force.sinkage, 0.15, rtol=1e-12)
-    answer = sinkage_search.first_equilibrium(case)
-    assert answer.status.tolist() == [0, 0, Status.TOO_HEAVY]
-    assert answer.load[2] == pytest.approx(at_hub, rel=1e-12)
-
-
 @pytest.mark.parametrize("slip", [-0.6, -0.95])
 def test_a_row_that_nothing_carries_states_the_largest_load(slip):
     ground = replace(SAND, shear_modulus=0.002, cohesion=500.0, friction_angle=0.7)

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from measured_rows import torque_rows
 from remarked import remarked
 
-from soilml import Operating, read_case
-from soilml.io.table import Table
+from soilml import Operating
 from soilml.numerics.quantiles import quantile_band
 from soilml.physics.soils.gravity_law import GravityChange
 from soilml.traction import SoilDraws, predict_traction
@@ -16,13 +16,6 @@ from soilml.traction.report import pull_report
 
 EARTH, MOON = 9.80665, 1.62
 SCHOOLS = ("constant", "proportional")
-SOIL = {"kphi": 1.5e6, "friction_angle": 0.6, "shear_modulus": 0.012, "unit_weight": 15000.0}
-SOIL |= {"cohesion": 500.0, "kc": 990.0, "n": 1.1}
-
-
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
 
 
 def test_draws_are_those_of_a_model_with_the_changed_soil(case):
@@ -38,10 +31,8 @@ def test_draws_are_those_of_a_model_with_the_changed_soil(case):
 
 @pytest.mark.slow
 def test_the_open_band_holds_the_medians_of_both_schools_and_says_what_the_law_costs(case):
-    true = case.with_values({"cohesion": 300.0, "friction_angle": 0.6, "shear_modulus": 0.012})
-    at = Operating(slip=np.asarray([0.1, 0.3, 0.5]), load=np.asarray([20.0, 60.0, 120.0]))
-    columns = {"run": np.full(3, "a"), "slip": at.slip, "load_N": at.load}
-    table = Table(columns | {"torque_Nm": true.model(true.soil, at).torque})
+    truth = {"cohesion": 300.0, "friction_angle": 0.6, "shear_modulus": 0.012}
+    table = torque_rows(case, truth, [0.1, 0.3, 0.5], [20.0, 60.0, 120.0])
     reports = {
         law: pull_report(
             case, table, loads=[20.0], exact_model=True, gravity=GravityChange(EARTH, MOON, law)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from remarked import remarked
 
-from soilml import DrawbarOffset, LoadTransfer, Operating, SlipSinkage, read_case
+from soilml import DrawbarOffset, LoadTransfer, Operating, SlipSinkage
 from soilml.config.case import Case
 from soilml.remarks import texts
 from soilml.traction import SoilDraws, predict_traction, quantile_band
@@ -14,11 +14,6 @@ from soilml.traction.pull_and_slope import predictions_by_load
 SLIPS = np.asarray([0.1, 0.3, 0.6])
 EVERYWHERE = MeasuredRange((0.0, 0.99), (1.0, 1e4))
 NAMES = ("cohesion", "friction_angle", "shear_modulus")
-
-
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
 
 
 def soils(*rows):
@@ -38,15 +33,6 @@ def test_on_the_climbed_slope_the_pull_equals_the_component_of_the_load(case):
     pull = soil.model(soil.soil, at).drawbar_pull
     np.testing.assert_allclose(pull, 80.0 * np.sin(found.slope), atol=1e-6)
     assert (found.slope < 0.0).any()  # some soils at some slips: downhill only
-
-
-def test_a_known_soil_has_no_band_and_the_model_s_own_pull(case):
-    one = (900.0, 0.6, 0.012)
-    found = quantile_band(predict_traction(case, soils(one, one, one), 60.0, SLIPS).pull)
-    true = case.with_values(dict(zip(NAMES, one, strict=True)))
-    pull = true.model(true.soil, Operating(slip=SLIPS, load=60.0)).drawbar_pull
-    for part in (found.lower, found.middle, found.upper):
-        np.testing.assert_allclose(part, pull, rtol=1e-9)
 
 
 def test_effects_of_the_soil_count_and_those_of_rig_and_sensors_do_not(case):

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from measured_rows import torque_rows
 
-from soilml import Operating, read_case
+from soilml import read_case
 from soilml.config.measurement_noise import Discrepancy, Noise
-from soilml.io.table import Table
 from soilml.traction import predict_traction
 from soilml.traction.soil_draws import measured_soil
 
@@ -25,13 +25,12 @@ def case(model_file):
 
 def drawn(case, *, with_pull):
     """Draws with errors, those of the prior, and the true pull, of torques measured at 60 N."""
-    true = case.with_values(SOIL)
-    force = true.model(true.soil, Operating(slip=SLIP, load=LOAD))
-    columns = {"run": np.full(3, "a"), "slip": SLIP, "load_N": LOAD, "torque_Nm": force.torque}
+    table = torque_rows(case, SOIL, SLIP, LOAD, more=["drawbar_pull_N"])
+    pull = table.columns.pop("drawbar_pull_N")
     if with_pull:
-        columns["drawbar_pull_N"] = force.drawbar_pull + ERROR
-    soil = measured_soil(case, Table(columns), exact_model=True)
-    return *soil.with_errors(SLIP, [60.0, 2000.0], ("drawbar_pull",)), force.drawbar_pull
+        table.columns["drawbar_pull_N"] = pull + ERROR
+    soil = measured_soil(case, table, exact_model=True)
+    return *soil.with_errors(SLIP, [60.0, 2000.0], ("drawbar_pull",)), pull
 
 
 def std_at(draws, load):

@@ -1,36 +1,31 @@
 """A missing effect hides from torque alone, and shows where sinkage is measured too."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from measured_rows import torque_rows
 from remarked import remarked
 
-from soilml import Operating, SlipSinkage, read_case
+from soilml import SlipSinkage
 from soilml.config.measurement_noise import Noise
-from soilml.io.table import Table
 from soilml.traction.report import pull_report
 from soilml.traction.soil_draws import measured_soil
 
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture
-def case(model_file):
-    return read_case(model_file)
+def with_sinkage(case):
+    return replace(case, model=case.model + SlipSinkage(n1=0.4))
 
 
 def test_a_sinkage_that_the_model_cannot_explain_is_said_and_widens_the_band(case):
     case.noise["sinkage_m"] = Noise(constant=0.0005)
     truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
-    true = case.with_values(truth)
-    at = Operating(slip=np.asarray([0.1, 0.3, 0.5]), load=np.asarray([40.0, 90.0, 60.0]))
     found = {}
-    for name, model in (("same", true.model), ("digging", true.model + SlipSinkage(n1=0.4))):
-        force = model(true.soil, at)
-        columns = {"run": np.full(3, "a"), "slip": at.slip, "load_N": at.load}
-        columns |= {"torque_Nm": force.torque, "sinkage_m": force.sinkage}
-        found[name] = pull_report(
-            case, Table(columns), loads=[60.0], slip_limit=0.5, exact_model=True
-        )
+    for name, own in (("same", case), ("digging", with_sinkage(case))):
+        rows = torque_rows(own, truth, [0.1, 0.3, 0.5], [40.0, 90.0, 60.0], more=["sinkage_m"])
+        found[name] = pull_report(case, rows, loads=[60.0], slip_limit=0.5, exact_model=True)
     same, digging = found["same"], found["digging"]
     assert not remarked(same.warnings, "lacks an effect")
     assert remarked(digging.warnings, "lacks an effect")
@@ -41,10 +36,9 @@ def test_rows_that_speak_against_the_model_are_said_beside_its_bands(case):
     """The averaged soil accounts for the effect; the model that the bands are of lacks it."""
     case.noise["sinkage_m"] = Noise(constant=0.0005)
     slip, load = np.tile([0.1, 0.3, 0.5], 2), np.repeat([40.0, 90.0], 3)
-    columns = {"run": np.repeat(["a", "b"], 3), "slip": slip, "load_N": load}
     for digging in (False, True):
-        model = case.model + SlipSinkage(n1=0.4) if digging else case.model
-        force = model(case.soil, Operating(slip=slip, load=load))
-        columns |= {"torque_Nm": force.torque, "sinkage_m": force.sinkage}
-        soil = measured_soil(case, Table(columns))
+        own = with_sinkage(case) if digging else case
+        rows = torque_rows(own, {}, slip, load, more=["sinkage_m"])
+        rows.columns["run"] = np.repeat(["a", "b"], 3)
+        soil = measured_soil(case, rows)
         assert ("against-model" in {w.code for w in soil.warnings}) == digging

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from measured_rows import torque_rows
 from remarked import remarked
 
 from soilml import Operating, read_case
 from soilml.config.measurement_noise import Discrepancy
 from soilml.config.remainder import Remainder, RemainderPart
 from soilml.config.wheeled_rover import RoverWheel, WheeledRover
-from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.traction.draws import SoilDraws
 from soilml.traction.rover_performance import rover_performance
@@ -72,18 +72,10 @@ def test_wheels_in_a_rut_are_those_of_the_second_pass(case):
 
 
 def measured(case, wheels):
-    true = case.with_values(dict(zip(NAMES, SOIL, strict=True)))
     slip, load = np.linspace(0.1, 0.5, len(wheels)), case.rover.loads(0.0)[: len(wheels)]
-    force = true.model(true.soil, Operating(slip=slip, load=load, pass_number=1.0))
-    return Table(
-        {
-            "run": np.full(len(wheels), "a"),
-            "slip": slip,
-            "load_N": load,
-            "torque_Nm": force.torque,
-            "wheel": np.asarray(wheels),
-        }
-    )
+    rows = torque_rows(case, dict(zip(NAMES, SOIL, strict=True)), slip, load)
+    rows.columns["wheel"] = np.asarray(wheels)
+    return rows
 
 
 @pytest.mark.slow

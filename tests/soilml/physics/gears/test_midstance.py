@@ -102,6 +102,20 @@ def test_forces_and_their_slopes_run_on_from_case_to_case(slip):
             assert after == pytest.approx(before, rel=0.02)
 
 
+@pytest.mark.parametrize("load", [2.0, 20.0, 45.0])  # low, medium and high sinkage
+def test_forces_of_the_profile_are_those_of_the_force(load):
+    at = Operating(slip=0.3, load=load)
+    force, found = Model(FOOT)(SAND, at), Model(FOOT).profile(SAND, at, points=20_001)
+    cos, sin = np.cos(found.angle), np.sin(found.angle)
+    assert found.angle[0] == pytest.approx(min(float(force.entry_angle), FOOT.arc))
+    for density, expected in (
+        (found.normal * cos + found.shear * sin, load),
+        (found.shear * cos - found.normal * sin, force.drawbar_pull),
+    ):
+        total = -np.trapezoid(density, found.angle) * FOOT.radius * FOOT.width
+        assert total == pytest.approx(float(expected), rel=1e-4)
+
+
 def test_a_foot_whose_centre_is_the_hub_is_the_wheel_ahead_of_its_axle():
     from soilml import Wheel
 

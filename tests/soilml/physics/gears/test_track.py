@@ -144,27 +144,25 @@ def test_profile_follows_the_law_and_is_nothing_where_the_belt_does_not_touch():
     assert profile.normal[-400:].max() == pytest.approx(rear, rel=1e-3)
 
 
-def test_torque_and_load_of_the_profile_are_those_of_the_force():
-    at = Operating(slip=0.3, load=LOAD)
-    profile, force = TRACK.profile(CLAY, at, points=20_001), TRACK(CLAY, at)
-    belt = GEAR.contact_geometry(np.asarray(float(force.sinkage)), CLAY, at)
-    length = GEAR.radius * (belt.entry + belt.leave + belt.meet + belt.exit)
+@pytest.mark.parametrize("slip", [0.0, 0.3, 0.6])
+@pytest.mark.parametrize("shape", ["usual", "slack", "tail down"])
+def test_forces_of_the_profile_are_those_of_the_force(shape, slip):
+    track = replace(GEAR, **SHAPES[shape])
+    at, model = Operating(slip=slip, load=LOAD), Model(track)
+    profile, force = model.profile(CLAY, at, points=20_001), model(CLAY, at)
+    belt = track.contact_geometry(np.asarray(float(force.sinkage)), CLAY, at)
+    length = track.radius * (belt.entry + belt.leave + belt.meet + belt.exit)
     length = length + belt.arc_radius * (belt.leave + belt.meet)
     along = np.linspace(0.0, float(length), 20_001)
-    lift = profile.normal * np.cos(profile.angle) + profile.shear * np.sin(profile.angle)
-    assert GEAR.width * np.trapezoid(lift, along) == pytest.approx(LOAD, rel=1e-4)
-    turning = GEAR.width * GEAR.radius * np.trapezoid(profile.shear, along)
-    assert force.torque == pytest.approx(turning, rel=1e-4)
 
+    def total(density):
+        return track.width * np.trapezoid(density, along)
 
-def test_grousers_far_slipped_shear_the_whole_block():
-    """Cohesion on the tips' plane and both sides, friction on the plane: eq. 13 beyond j_k."""
-    ground = replace(CLAY, shear_modulus=1e-4)
-    force = (TRACK + Grousers(spacing=1.0, height=0.012))(ground, Operating(slip=0.9, load=LOAD))
-    bare = TRACK(ground, Operating(slip=0.9, load=LOAD))
-    area = (bare.torque / 0.1 - LOAD * np.tan(ground.friction_angle)) / ground.cohesion
-    sides = force.torque / 0.1 - bare.torque / 0.1
-    assert sides == pytest.approx(ground.cohesion * area * 2.0 * 0.012 / 0.08, rel=0.1)
+    cos, sin = np.cos(profile.angle), np.sin(profile.angle)
+    assert total(profile.normal * cos + profile.shear * sin) == pytest.approx(LOAD, rel=1e-4)
+    pull = total(profile.shear * cos - profile.normal * sin)
+    assert force.drawbar_pull == pytest.approx(pull, abs=1e-4 * LOAD)
+    assert force.torque == pytest.approx(track.radius * total(profile.shear), rel=1e-4)
 
 
 def test_what_cannot_be_is_refused():
