@@ -24,6 +24,7 @@ from shared_files import shared_folder
 from slip_step_fixtures import slip_case as slip_case
 from slip_step_fixtures import slip_drive as slip_drive
 from slip_step_fixtures import slip_files as slip_files
+from slip_step_fixtures import slip_in_c as slip_in_c
 from slip_step_fixtures import slip_stream as slip_stream
 
 #: The reference wheel on dry sand.

@@ -91,7 +91,6 @@ def test_the_estimate_out_of_range_is_the_prior(estimator, wheel_posterior):
     assert found.std == pytest.approx(estimator.prior.std, rel=1e-5)
 
 
-@pytest.mark.slow
 def test_a_file_for_any_wheel_requires_its_context(any_wheel):
     with pytest.raises(InputError, match="wheel_radius"):
         any_wheel.run(slip=0.3, torque=2.0, load=60.0)

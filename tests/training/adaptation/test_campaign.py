@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import MODEL
 
 from datagen.recipe import read_recipe
 from soilml import SlipSinkage, read_case
@@ -21,10 +20,8 @@ from training.set_posterior.families.recipe_family import RecipeFamily
 
 
 @pytest.fixture
-def case(tmp_path):
-    path = tmp_path / "model.toml"
-    path.write_text(MODEL)
-    return read_case(path)
+def case(model_file):
+    return read_case(model_file)
 
 
 def log(runs=8, rows=4, **more):
