@@ -168,14 +168,20 @@ def small_model(small_data: Path, tmp_path_factory: pytest.TempPathFactory) -> P
 LENIENT = ((1.0, 8.0, 64.0, 512.0), (15.0, 30.0, 120.0, 700.0))
 
 
-def _exported(folder: Path, family, posterior, noise) -> Path:
+#: Noise of the sensors in the files of sets.
+SET_NOISE = {"torque": [0.0, 0.02], "sinkage": [0.0005, 0.05], "drawbar_pull": [0.5, 0.03]}
+
+
+def _exported(folder: Path, posterior) -> Path:
+    from dataclasses import replace
+
     from training.export.model_file import export_any_wheel
     from training.set_posterior.response_surface import ResponseSettings
     from training.spec import AnyWheelSpec
 
     path = folder / "small.onnx"
-    spec = AnyWheelSpec(family, ResponseSettings(0, 0, 0, 0), noise, "{}")
-    export_any_wheel(spec, posterior, {}, path)
+    spec = AnyWheelSpec(posterior.family, ResponseSettings(0, 0, 0, 0), SET_NOISE, "{}")
+    export_any_wheel(spec, replace(posterior, noise=SET_NOISE), {}, path)
     return path
 
 
@@ -210,9 +216,7 @@ def wheel_posterior(tmp_path_factory: pytest.TempPathFactory):
 @pytest.fixture(scope="session")
 def wheel_set_file(wheel_posterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same as a model file, without regressors of single readings."""
-    noise = {"torque": [0.0, 0.02], "sinkage": [0.0005, 0.05], "drawbar_pull": [0.5, 0.03]}
-    folder = tmp_path_factory.mktemp("wheel_set")
-    return _exported(folder, wheel_posterior.family, wheel_posterior, noise)
+    return _exported(tmp_path_factory.mktemp("wheel_set"), wheel_posterior)
 
 
 @pytest.fixture(scope="session")
@@ -231,8 +235,7 @@ def any_posterior(tmp_path_factory: pytest.TempPathFactory):
 @pytest.fixture(scope="session")
 def any_set_file(any_posterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same as a model file."""
-    noise = {"torque": [0.0, 0.02], "sinkage": [0.0005, 0.05], "drawbar_pull": [0.5, 0.03]}
-    return _exported(tmp_path_factory.mktemp("any_set"), any_posterior.family, any_posterior, noise)
+    return _exported(tmp_path_factory.mktemp("any_set"), any_posterior)
 
 
 def simulated_run(posterior, rows, seed=0, x=(0.2, -0.3, 0.1)):

@@ -39,29 +39,33 @@ class Slider:
     text: str = ""
 
 
-_OPERATING = {
-    "slip": Slider("Slip", "s", "", 1.0, (-0.9, 0.95), text="driving above zero, braking below"),
-    "load": Slider("Vertical load", "W", "N", 1.0, (5.0, 5000.0), log=True),
-}
-_STRENGTH = {
-    "cohesion": Slider("Cohesion", "c", "kPa", 1e-3, (0.0, 10.0)),
-    "friction_angle": Slider("Friction angle", "φ", "°", 180.0 / pi, (10.0, 50.0)),
-    "shear_modulus": Slider("Shear modulus", "K", "mm", 1e3, (1.0, 100.0), log=True,
-                            text="how far soil is sheared until its strength is mobilised"),
+#: Sliders by group and path; a parameter that the case lacks has none.
+_GROUPS: dict[str, dict[str, Slider]] = {
+    "Operating point": {
+        "slip": Slider("Slip", "s", "", 1.0, (-0.9, 0.95),
+                       text="driving above zero, braking below"),
+        "load": Slider("Vertical load", "W", "N", 1.0, (5.0, 5000.0), log=True),
+    },
+    "Strength of the soil": {
+        "cohesion": Slider("Cohesion", "c", "kPa", 1e-3, (0.0, 10.0)),
+        "friction_angle": Slider("Friction angle", "φ", "°", 180.0 / pi, (10.0, 50.0)),
+        "shear_modulus": Slider("Shear modulus", "K", "mm", 1e3, (1.0, 100.0), log=True,
+                                text="how far soil is sheared until its strength is mobilised"),
+    },
+    "Bearing of the soil": {
+        "kphi": Slider("Frictional modulus", "kφ", "MN/mⁿ⁺²", 1e-6, (0.01, 100.0), log=True),
+        "kc": Slider("Cohesive modulus", "kc", "kN/mⁿ⁺¹", 1e-3, (0.0, 100.0)),
+        "n": Slider("Exponent of sinkage", "n", "", 1.0, (0.3, 2.0)),
+        "a0": Slider("Place of the largest stress", "a₀", "", 1.0, (0.1, 0.8),
+                     text="as a share of the entry angle, at no slip"),
+        "a1": Slider("Its growth with slip", "a₁", "", 1.0, (0.0, 0.5)),
+    },
+    "Wheel": {
+        "gear.radius": Slider("Radius", "r", "mm", 1e3, (20.0, 500.0), log=True),
+        "gear.width": Slider("Width", "b", "mm", 1e3, (10.0, 500.0), log=True),
+        "gear.base": Slider("Length between axles", "l", "mm", 1e3, (100.0, 2000.0), log=True),
+    },
 }  # fmt: skip
-_BEARING = {
-    "kphi": Slider("Frictional modulus", "kφ", "MN/mⁿ⁺²", 1e-6, (0.01, 100.0), log=True),
-    "kc": Slider("Cohesive modulus", "kc", "kN/mⁿ⁺¹", 1e-3, (0.0, 100.0)),
-    "n": Slider("Exponent of sinkage", "n", "", 1.0, (0.3, 2.0)),
-    "a0": Slider("Place of the largest stress", "a₀", "", 1.0, (0.1, 0.8),
-                 text="as a share of the entry angle, at no slip"),
-    "a1": Slider("Its growth with slip", "a₁", "", 1.0, (0.0, 0.5)),
-}  # fmt: skip
-_GEAR = {
-    "gear.radius": Slider("Radius", "r", "mm", 1e3, (20.0, 500.0), log=True),
-    "gear.width": Slider("Width", "b", "mm", 1e3, (10.0, 500.0), log=True),
-    "gear.base": Slider("Length between axles", "l", "mm", 1e3, (100.0, 2000.0), log=True),
-}
 #: Shown units of what has no slider above.
 _UNITS = {"Pa": ("kPa", 1e-3), "rad": ("°", 180.0 / pi), "m": ("mm", 1e3), "1": ("", 1.0)}
 
@@ -72,26 +76,20 @@ def controls(request: dict[str, Any]) -> dict[str, Any]:
     Raises `InputError` where the choice or the model file is wrong.
     """
     case = forward_case(request)
-    known = case.parameters()
     wheel = request.get("wheel", FIRST_WHEEL)
-    load = 60.0 if request.get("model") else WHEELS[wheel].load
-    operating = declared(Operating)
-    groups = [
-        ("Operating point", [_control(k, s, operating[k], {"slip": 0.3, "load": load}[k])
-                             for k, s in _OPERATING.items()]),
-        ("Strength of the soil", _known(_STRENGTH, known)),
-        ("Bearing of the soil", _known(_BEARING, known)),
-        ("Track" if case.model.gear.name == "track" else "Wheel", _known(_GEAR, known)),
-        ("Effects", list(_effects(case))),
-    ]  # fmt: skip
+    at = {"slip": 0.3, "load": 60.0 if request.get("model") else WHEELS[wheel].load}
+    known = case.parameters() | {name: (declared(Operating)[name], v) for name, v in at.items()}
+    groups = {
+        title: [_control(k, s, *known[k]) for k, s in sliders.items() if k in known]
+        for title, sliders in _GROUPS.items()
+    }
+    if case.model.gear.name == "track":
+        groups["Track"] = groups.pop("Wheel")
+    groups["Effects"] = list(_effects(case))
     return {
         "gear": case.model.gear.name,
-        "groups": [{"title": title, "controls": own} for title, own in groups if own],
+        "groups": [{"title": title, "controls": own} for title, own in groups.items() if own],
     }
-
-
-def _known(sliders: dict[str, Slider], known: dict[str, Any]) -> list[dict[str, Any]]:
-    return [_control(k, s, *known[k]) for k, s in sliders.items() if k in known]
 
 
 def _effects(case: Case) -> Any:
@@ -165,14 +163,11 @@ def forward(request: dict[str, Any]) -> dict[str, Any]:
         **{name: values[:-1] for name, values in curves.items()},
         "at": {name: values[-1] for name, values in curves.items()},
         "reason": "" if status is Status.OK else status.reason,
-        "profile": None,
+        "profile": _profile(case, slip, load) if status is Status.OK else None,
         "gear": case.model.gear.name,
         "radius": float(getattr(case.model.gear, "radius", np.nan)),
     }
     answer["at"] |= {"slip": slip, "load": load, "pull_per_load": curves["pull"][-1] / load}
-    if status is Status.OK:
-        profile = _profile(case, slip, load)
-        answer["profile"] = profile
     return answer
 
 

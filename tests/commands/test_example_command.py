@@ -1,6 +1,7 @@
 """`soilml example`: each example runs through the command that it names."""
 
 import pytest
+from console import refused
 
 from soilml import gap
 from soilml.cli import main
@@ -38,9 +39,7 @@ def test_the_rover_answers_for_slopes(tmp_path, monkeypatch, capsys):
 def test_examples_replace_nothing_and_name_each_other(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "model.toml").write_text("mine")
-    assert main(["example", "."]) == 2
-    assert "model.toml exists; give another folder" in capsys.readouterr().err
-    assert (tmp_path / "model.toml").read_text() == "mine"
+    refused(["example", "."], capsys, "model.toml exists; give another folder", tmp_path)
     assert main(["example", "campain", "x"]) == 2
     said = capsys.readouterr().err
     assert "did you mean 'campaign'" in said and all(name in said for name in EXAMPLES)
@@ -70,7 +69,6 @@ def test_the_chain_of_a_paper_runs_on_its_example(name, said, tmp_path, monkeypa
 def test_a_log_of_a_track_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["example", "track", "."]) == 0
-    capsys.readouterr()
     command = ["paper", "track", "model.toml", "log.csv", "--mass", "130"]
     rows = (tmp_path / "log.csv").read_text().splitlines()
     (tmp_path / "short.csv").write_text("\n".join(rows[:60]) + "\n")
@@ -79,7 +77,4 @@ def test_a_log_of_a_track_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
         ([*command, "--spacing", "0.6", "--grousers", "1,2"], "needed are pitch, tip, f_g and j_k"),
         ([*command[:3], "short.csv", *command[4:], "--spacing", "0.6"], "run pull_1: signal has"),
     ):
-        assert main([*words, "--out", "x.csv"]) == 2
-        said = capsys.readouterr().err.strip().splitlines()[-1]
-        assert expected in said
-        assert not (tmp_path / "x.csv").exists()
+        refused([*words, "--out", "x.csv"], capsys, expected, tmp_path)

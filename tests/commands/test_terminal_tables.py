@@ -50,27 +50,11 @@ WORDS = {
 }
 #: Commands whose tables have tests of their own, or that print none.
 ELSEWHERE = {
-    "init",
-    "example",
-    "setup completion",
-    "import",
-    "generate",
-    "train",
-    "plan runs",
-    "export c",
-    "export fusion",
-    "drive slip",
-    "drive map",
+    *("init", "example", "setup completion", "serve", "import", "generate", "train", "adapt"),
+    *("compare", "plan runs", "export c", "export fusion", "export step", "export slip"),
     "export soil",  # in the units of the program that it writes for
-    "export step",
-    "export slip",
-    "adapt",
-    "compare",
-    "paper climb",
-    "paper wheel-leg",
-    "paper sensor-wheel",
+    *("drive slip", "drive map", "paper climb", "paper wheel-leg", "paper sensor-wheel"),
     "paper track",
-    "serve",
 }
 
 

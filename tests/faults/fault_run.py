@@ -49,7 +49,6 @@ drawbar_pull_N = "2 % + 0.2"
 #: What is killed: the words of each command, in a folder with its inputs; it writes below `out`.
 COMMANDS = {
     "generate": "generate wheel out/d.parquet --rows 60000 --workers 2",
-    "generate-folder": "generate wheel out/ --rows 300000 --workers 2",
     "train": "train spec.toml data.parquet out/m.onnx",
     "gap": "gap model.toml runs.csv --out out",
     "estimate": "estimate wheel.onnx long.csv --out out/e.csv",

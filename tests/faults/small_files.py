@@ -16,19 +16,6 @@ import numpy as np
 
 #: Address space of a command, bytes: a reader without bounds ends here, and not the machine.
 LIMIT = 8 << 30
-MODEL = """\
-[gear]
-type = "wheel"
-radius = 0.15
-width = 0.12
-[soil]
-name = "wong1989/dry_sand"
-[soil.prior]
-cohesion = [0.0, 3000.0]
-friction_angle = [0.4, 0.8]
-[noise]
-torque_Nm = "2 %"
-"""
 
 
 def run(words, folder, seconds=60):

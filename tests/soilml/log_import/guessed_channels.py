@@ -140,6 +140,11 @@ def states(content, name, value):
     return any(abs(t.get(name, 0) / value - 1) < 0.01 for t in tables)
 
 
+def printed(capsys):
+    """What a command printed, on one line."""
+    return " ".join(" ".join(capsys.readouterr()).split())
+
+
 def judged_rigs(module):
     """Rig -> judgement of each channel."""
     found = {}

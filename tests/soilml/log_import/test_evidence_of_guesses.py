@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from foreign_rigs import RADIUS, drive, noisy
-from guessed_channels import LOOKED_AT, RIGHT, SILENT, is_marked, judged_rigs
+from guessed_channels import LOOKED_AT, RIGHT, SILENT, is_marked, judged_rigs, printed
 from rig_tables import write
 
 from soilml.cli import main
@@ -125,7 +125,7 @@ def test_odometry_of_the_wheel_is_marked_whatever_its_radius(radius, noise, tmp_
     assert "computed from the rotation" in text
     text = text.replace("# radius = ", f'radius = "{RADIUS} m"  # ')
     refused = imported(tmp_path, [log], text)
-    said = capsys.readouterr().err
+    said = printed(capsys)
     assert refused == 2 if radius == 1.0 else "was the travel computed from the rotation" in said
     assert "divided by 100 twice" not in said
 
@@ -164,7 +164,7 @@ def test_windows_of_a_sensor_that_clips_are_without_it(tmp_path, capsys):
     log.write_text("\n".join([lines[0], *(",".join(f"{x:.5f}" for x in row) for row in rows)]))
     text = init(tmp_path, [log]).replace("# radius = ", f'radius = "{RADIUS} m"  # ')
     assert imported(tmp_path, [log], text) == 0
-    assert f"[torque] reads {limit:.4g} in" in capsys.readouterr().err
+    assert f"[torque] reads {limit:.4g} in" in printed(capsys)
     rows = np.genfromtxt(tmp_path / "runs.csv", delimiter=",", names=True, encoding=None)
     assert np.isnan(rows["torque_Nm"][rows["slip"] > 0.45]).all()
     assert np.isfinite(rows["torque_Nm"][rows["slip"] < 0.2]).all()
@@ -240,7 +240,7 @@ def test_rows_of_several_wheels_keep_their_sizes_and_are_refused(tmp_path, capsy
         "slip": [0.1, 0.3, 0.1, 0.3], "torque_Nm": [1.3, 2, 3, 5]})  # fmt: skip
     text = init(tmp_path, [log])
     assert imported(tmp_path, [log], text) == 0
-    assert "rows of several wheels" in capsys.readouterr().err
+    assert "rows of several wheels" in printed(capsys)
     (tmp_path / "model.toml").write_text(MODEL)
     assert main(["identify", str(tmp_path / "model.toml"), str(tmp_path / "runs.csv")]) == 2
     assert "wheel_radius_m" in capsys.readouterr().err
@@ -330,7 +330,7 @@ def test_what_was_computed_shares_its_error(tmp_path, capsys):
     text = init(tmp_path, [log]).replace("# radius = ", f'radius = "{RADIUS} m"  # ')
     text = text.replace('bias = "1 %"', "")
     assert imported(tmp_path, [log], text) == 0
-    said = capsys.readouterr().err
+    said = printed(capsys)
     assert "[torque] is a constant times the current 'current'" in said
     assert "[load] is a constant or follows from the slope" in said
     bias = tomllib.loads((tmp_path / "runs.bias.toml").read_text())["bias"]

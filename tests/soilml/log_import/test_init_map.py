@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from guessed_channels import printed
 from simulated_rig import LOAD, RADIUS, RADIUS_EDIT, drive, imported, noisy, torque_law, write_csv
 
 from soilml.cli import main
@@ -179,7 +180,7 @@ def test_the_traps_of_real_logs(rig_logs, tmp_path, capsys):
     text = (tmp_path / "map.toml").read_text()
     (tmp_path / "map.toml").write_text(text.replace("gear_ratio = 1 ", "gear_ratio = 99 "))
     assert main(["import", *logs, "--map", chart, "--out", str(out)]) == 0
-    said = capsys.readouterr().err
+    said = printed(capsys)
     assert "run test_2: the sensor of [torque] is dead: it reads 0.0031 throughout" in said
     table = read_table(out, ("run", "slip", "load_N", "torque_Nm"))
     by_run = dict(table.groups())
