@@ -132,6 +132,13 @@ def model_file(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.fixture
+def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of the test's own, in which it works."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
 @pytest.fixture(scope="session")
 def small_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Some thousand rows, a quarter of them in runs of 32."""
@@ -166,8 +173,6 @@ def small_model(small_data: Path, tmp_path_factory: pytest.TempPathFactory) -> P
 
 #: What a set of readings may be off by, generously: nothing of it is measured here.
 LENIENT = ((1.0, 8.0, 64.0, 512.0), (15.0, 30.0, 120.0, 700.0))
-
-
 #: Noise of the sensors in the files of sets.
 SET_NOISE = {"torque": [0.0, 0.02], "sinkage": [0.0005, 0.05], "drawbar_pull": [0.5, 0.03]}
 
@@ -217,6 +222,14 @@ def wheel_posterior(tmp_path_factory: pytest.TempPathFactory):
 def wheel_set_file(wheel_posterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same as a model file, without regressors of single readings."""
     return _exported(tmp_path_factory.mktemp("wheel_set"), wheel_posterior)
+
+
+@pytest.fixture(scope="session")
+def wheel_sets(wheel_set_file: Path):
+    """Its estimator."""
+    from soilml import Estimator
+
+    return Estimator.load(wheel_set_file)
 
 
 @pytest.fixture(scope="session")

@@ -19,11 +19,10 @@ RUNS = "run,slip,load_N,torque_Nm\na,0.2,60,2.9\na,0.2,60,2.95\n"
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    (tmp_path / "model.toml").write_text(MODEL)
-    (tmp_path / "runs.csv").write_text(RUNS)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+def folder(workplace):
+    (workplace / "model.toml").write_text(MODEL)
+    (workplace / "runs.csv").write_text(RUNS)
+    return workplace
 
 
 def test_the_table_names_the_best_rows_and_what_they_leave(folder, capsys):

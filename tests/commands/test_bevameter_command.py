@@ -22,12 +22,11 @@ SHEAR = "test,normal_stress_Pa,shear_displacement_m,shear_stress_Pa\n" + "".join
 
 
 @pytest.fixture
-def tables(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "plates.csv").write_text(PLATES)
-    (tmp_path / "shear.csv").write_text(SHEAR)
-    (tmp_path / "model.toml").write_text(MODEL)
-    return tmp_path
+def tables(workplace):
+    (workplace / "plates.csv").write_text(PLATES)
+    (workplace / "shear.csv").write_text(SHEAR)
+    (workplace / "model.toml").write_text(MODEL)
+    return workplace
 
 
 @pytest.mark.slow

@@ -43,12 +43,11 @@ def tables(true):
 
 
 @pytest.fixture
-def folder(tmp_path, tables, monkeypatch):
-    (tmp_path / "rover.toml").write_text(ROVER)
-    (tmp_path / "runs.csv").write_text(csv_text(tables[0]))
-    (tmp_path / "stress.csv").write_text(csv_text(tables[1]))
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+def folder(workplace, tables):
+    (workplace / "rover.toml").write_text(ROVER)
+    (workplace / "runs.csv").write_text(csv_text(tables[0]))
+    (workplace / "stress.csv").write_text(csv_text(tables[1]))
+    return workplace
 
 
 @pytest.mark.slow

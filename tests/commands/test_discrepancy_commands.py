@@ -13,18 +13,17 @@ DISCREPANCY = '[discrepancy]\ntorque_Nm = "3 %"\ndrawbar_pull_N = 1.5\n'
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(workplace):
     """A model file without discrepancy and one with it, and nine rows on a soil of the prior."""
-    (tmp_path / "plain.toml").write_text(MODEL)
-    (tmp_path / "model.toml").write_text(MODEL + DISCREPANCY)
-    case = read_case(tmp_path / "plain.toml")
+    (workplace / "plain.toml").write_text(MODEL)
+    (workplace / "model.toml").write_text(MODEL + DISCREPANCY)
+    case = read_case(workplace / "plain.toml")
     true = case.with_values({"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012})
     slip, load = np.tile([0.1, 0.3, 0.5], 3), np.repeat([40.0, 70.0, 110.0], 3)
     torque = true.model(true.soil, Operating(slip=slip, load=load)).torque
     rows = "".join(f"a,{s},{w},{t}\n" for s, w, t in zip(slip, load, torque, strict=True))
-    (tmp_path / "runs.csv").write_text("run,slip,load_N,torque_Nm\n" + rows)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+    (workplace / "runs.csv").write_text("run,slip,load_N,torque_Nm\n" + rows)
+    return workplace
 
 
 def spoken(capsys, *command):

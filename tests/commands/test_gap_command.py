@@ -21,27 +21,22 @@ FILES = ["gap.json", "model.toml", "next_runs.csv", "report.html"]
 COLUMNS = ("torque_Nm", "drawbar_pull_N", "sinkage_m")
 
 OWN = '''\
-from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar
+from dataclasses import replace
+from typing import Annotated
 
 from soilml.arrays import Real
-from soilml.physics.effects import Effect, EffectCard
 from soilml.parameters import Parameter
+from soilml.physics.effects import Effect, effect
 
 
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "cable-drag", text="a cable is dragged along", source="own", kind="rig",
+    reference={"drag": 20.0}, signs={"drawbar_pull": -1},
+    isolate="the same runs without the cable",
+)
 class CableDrag(Effect):
     """A cable that is dragged along pulls back, the more the wheel slips."""
 
-    name: ClassVar[str] = "cable-drag"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="a cable is dragged along",
-        source="own",
-        kind="rig",
-        reference={"drag": 20.0},
-        signs={"drawbar_pull": -1},
-        isolate="the same runs without the cable",
-    )
     drag: Annotated[Real, Parameter("N", 0.0, 200.0, "pull at a slip of one")] = 0.0
 
     def on_reading(self, force, scene):

@@ -20,11 +20,10 @@ c,0.3,80,3.54,no equilibrium
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    (tmp_path / "model.toml").write_text(MODEL)
-    (tmp_path / "runs.csv").write_text(RUNS)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+def folder(workplace):
+    (workplace / "model.toml").write_text(MODEL)
+    (workplace / "runs.csv").write_text(RUNS)
+    return workplace
 
 
 @pytest.mark.slow

@@ -21,11 +21,10 @@ MARK = 'from pathlib import Path\n\nPath("it_ran").touch()\n'
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    (tmp_path / "model.toml").write_text(THREE_CHANNEL_MODEL)
-    (tmp_path / "own.py").write_text(MARK)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+def folder(workplace):
+    (workplace / "model.toml").write_text(THREE_CHANNEL_MODEL)
+    (workplace / "own.py").write_text(MARK)
+    return workplace
 
 
 @pytest.mark.parametrize("form", ["{} = 1", "[{}]", "[[{}]]", "x = {{ {} = 1 }}", " {} =1"])

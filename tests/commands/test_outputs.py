@@ -18,13 +18,12 @@ SIMULATE = ["simulate", "model.toml", "--slip", "0.1", "--load", "60"]
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    (tmp_path / "model.toml").write_text(MODEL)
-    (tmp_path / "recipe.toml").write_text(RECIPE.format(rows=300, seed=1))
-    (tmp_path / "spec.toml").write_text('[[regressor]]\ntype = "linear"\n')
-    (tmp_path / "runs.csv").write_text(RUNS)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+def folder(workplace):
+    (workplace / "model.toml").write_text(MODEL)
+    (workplace / "recipe.toml").write_text(RECIPE.format(rows=300, seed=1))
+    (workplace / "spec.toml").write_text('[[regressor]]\ntype = "linear"\n')
+    (workplace / "runs.csv").write_text(RUNS)
+    return workplace
 
 
 def test_no_command_writes_over_what_it_reads(folder, capsys, small_model, small_data):
@@ -77,8 +76,7 @@ def one_line(process, status, said):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "status"),
-    [("SIGTERM", 143), pytest.param("SIGHUP", 129, marks=pytest.mark.long)],
+    ("name", "status"), [("SIGTERM", 143), pytest.param("SIGHUP", 129, marks=pytest.mark.long)]
 )
 def test_a_signal_to_stop_leaves_nothing_half_written(folder, name, status):
     number = getattr(signal, name)

@@ -16,12 +16,11 @@ COMMAND = ["pull", "model.toml", "runs.csv", "--load", "60", "--slip-limit", "0.
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(workplace):
     """A model file, and two rows without noise on a soil of its prior."""
-    (tmp_path / "model.toml").write_text(MODEL)
-    (tmp_path / "runs.csv").write_text(ROWS.format(*torque(tmp_path)))
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+    (workplace / "model.toml").write_text(MODEL)
+    (workplace / "runs.csv").write_text(ROWS.format(*torque(workplace)))
+    return workplace
 
 
 def truth(folder, slip):

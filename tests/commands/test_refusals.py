@@ -170,7 +170,7 @@ LINES = {
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch, small_model, small_data):
+def folder(workplace, small_model, small_data):
     many = [
         f"{r},{s},{w},{s * w / 20}" for r, w in (("a", 60), ("b", 80)) for s in np.arange(1, 6) / 10
     ]
@@ -196,16 +196,15 @@ def folder(tmp_path, monkeypatch, small_model, small_data):
         "same/model.toml": MODEL,
         "same/next_runs.csv": RUNS,
     }
-    (tmp_path / "taken/gap.json").mkdir(parents=True)
-    (tmp_path / "same").mkdir()
+    (workplace / "taken/gap.json").mkdir(parents=True)
+    (workplace / "same").mkdir()
     for name, text in texts.items():
-        (tmp_path / name).write_text(text)
+        (workplace / name).write_text(text)
     for file in (small_model, small_data):
         content = file.read_bytes()
-        (tmp_path / f"good{file.suffix}").write_bytes(content)
-        (tmp_path / f"cut{file.suffix}").write_bytes(content[:5000])
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+        (workplace / f"good{file.suffix}").write_bytes(content)
+        (workplace / f"cut{file.suffix}").write_bytes(content[:5000])
+    return workplace
 
 
 @pytest.mark.parametrize("line", LINES)

@@ -43,11 +43,10 @@ class Seen(HTMLParser):
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    (tmp_path / "model.toml").write_text(MODEL)
-    (tmp_path / "runs.csv").write_text(RUNS)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+def folder(workplace):
+    (workplace / "model.toml").write_text(MODEL)
+    (workplace / "runs.csv").write_text(RUNS)
+    return workplace
 
 
 COMMANDS = {

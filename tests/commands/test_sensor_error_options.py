@@ -20,12 +20,11 @@ BIAS = '[bias]\nslip = 0.0\nload_N = "0 %"\ntorque_Nm = "5 % + 0.1"\nsinkage_m =
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "exact.toml").write_text(MODEL)
-    (tmp_path / "noisy.toml").write_text(MODEL + 'slip = 0.02\nload_N = "2 %"\n')
-    (tmp_path / "biased.toml").write_text(MODEL + BIAS)
-    return tmp_path
+def folder(workplace):
+    (workplace / "exact.toml").write_text(MODEL)
+    (workplace / "noisy.toml").write_text(MODEL + 'slip = 0.02\nload_N = "2 %"\n')
+    (workplace / "biased.toml").write_text(MODEL + BIAS)
+    return workplace
 
 
 def write_runs(path: Path, run: dict[str, np.ndarray], **columns: float) -> None:

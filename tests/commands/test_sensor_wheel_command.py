@@ -22,7 +22,7 @@ SLOPES = {"flat": (0.11, 0.0), "up4": (0.29, math.radians(4.0)), "up6": (0.39, m
 
 
 @pytest.fixture
-def files(tmp_path, monkeypatch):
+def files(workplace):
     """A wheel of k_x 7.2 mm on three slopes, its stress half of the true one."""
     sand = soil("nagatani2009/toyoura_sand")
     strength = MohrCoulomb(friction_angle=sand.friction_angle, cohesion=sand.cohesion)
@@ -34,9 +34,8 @@ def files(tmp_path, monkeypatch):
         for angle, normal in zip(true.angle, 0.5 * true.normal, strict=True):
             stress += f"{name},{angle:.12g},{normal:.12g}\n"
     for name, text in (("m.toml", MODEL), ("runs.csv", runs), ("stress.csv", stress)):
-        (tmp_path / name).write_text(text)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+        (workplace / name).write_text(text)
+    return workplace
 
 
 COMMAND = ["paper", "sensor-wheel", "m.toml", "runs.csv", "--stress", "stress.csv"]

@@ -46,8 +46,7 @@ def test_doctor_finds_nothing_wrong_here_and_says_what_is_missing(capsys, monkey
     assert "! onnxruntime is missing: pip install onnxruntime" in capsys.readouterr().out
 
 
-def test_init_takes_sizes_with_their_units(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_init_takes_sizes_with_their_units(workplace, capsys):
     names = ("--radius", "--width", "--mass", "--wheelbase", "--track", "--height")
     for file, sizes in {
         "a.toml": ("150 mm", "12 cm", "8 kg", "60 cm", "500 mm", "0.2 m"),
@@ -55,7 +54,7 @@ def test_init_takes_sizes_with_their_units(tmp_path, capsys, monkeypatch):
     }.items():
         words = [word for pair in zip(names, sizes, strict=True) for word in pair]
         assert main(["init", file, *words]) == 0
-    assert (tmp_path / "a.toml").read_text() == (tmp_path / "b.toml").read_text()
+    assert (workplace / "a.toml").read_text() == (workplace / "b.toml").read_text()
     words = ["init", "c.toml", "--radius", "15 inch", "--width", "0.1"]
     needed = "needed is a number in m, or a text with one of the units m"
-    refused(words, capsys, f"--radius is '15 inch'; {needed}", tmp_path)
+    refused(words, capsys, f"--radius is '15 inch'; {needed}", workplace)

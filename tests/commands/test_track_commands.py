@@ -28,10 +28,9 @@ SIMULATE = ["simulate", "m.toml", "--slip", "0.02,0.1,0.3", "--load", "638", "--
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    (tmp_path / "m.toml").write_text(MODEL)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+def folder(workplace):
+    (workplace / "m.toml").write_text(MODEL)
+    return workplace
 
 
 def test_the_shares_carry_the_load(folder, capsys):

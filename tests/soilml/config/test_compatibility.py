@@ -259,9 +259,8 @@ def test_a_file_for_simulated_rows_has_no_errors_that_rows_share(case, any_wheel
     biased, _ = trained.condition_on_case(any_wheel, fitted)
     assert (np.asarray(exact.std) <= np.asarray(biased.run(**table).std) * (1 + 1e-6)).all()
     assert (np.asarray(exact.std) < 0.999 * np.asarray(biased.run(**table).std)).any()
-    single = Estimator.load("exported/wheel_linear.onnx")
-    if single.sets is None:
-        assert trained.for_simulated_case(single, fitted) is single
+    single = Estimator.load("wheel_linear")
+    assert trained.for_simulated_case(single, fitted) is single
 
 
 def test_a_file_takes_noise_and_biases_of_the_case(case, any_wheel):

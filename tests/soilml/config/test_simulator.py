@@ -155,13 +155,12 @@ def test_outside_the_runs_there_is_no_answer(box):
 
 @pytest.mark.parametrize("how", ["python", pytest.param("command", marks=pytest.mark.slow)])
 def test_design_runs_makes_runs_and_more_where_the_emulator_is_unsure(
-    folder, tmp_path, monkeypatch, capsys, how
+    folder, workplace, capsys, how
 ):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "rig.py").write_text(RIG + BY_COMMAND)
+    (workplace / "rig.py").write_text(RIG + BY_COMMAND)
     own = {"python": 'python = "rig.py:forces"', "command": 'command = "PY rig.py {design} {runs}"'}
     text = MODEL + SIMULATOR + own[how].replace("PY", sys.executable) + "\n"
-    (tmp_path / "model.toml").write_text(text)
+    (workplace / "model.toml").write_text(text)
     assert main(["design-runs", "model.toml", "--trust", "--count", "40"]) == 0
     captured = capsys.readouterr()
     assert "40 runs in" in captured.err and "torque_Nm" in captured.out
@@ -183,12 +182,11 @@ def test_design_runs_makes_runs_and_more_where_the_emulator_is_unsure(
     ids=["python", "command"],
 )
 @pytest.mark.parametrize("words", [[], ["--out", "design.csv"]], ids=["printed", "written"])
-def test_a_model_file_runs_no_code_by_itself(tmp_path, monkeypatch, capsys, own, words):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "rig.py").write_text('from pathlib import Path\n\nPath("it_ran").touch()\n' + RIG)
-    (tmp_path / "model.toml").write_text(MODEL + SIMULATOR + own + "\n")
+def test_a_model_file_runs_no_code_by_itself(workplace, capsys, own, words):
+    (workplace / "rig.py").write_text('from pathlib import Path\n\nPath("it_ran").touch()\n' + RIG)
+    (workplace / "model.toml").write_text(MODEL + SIMULATOR + own + "\n")
     assert main(["design-runs", "model.toml", "--count", "40", *words]) == 0
-    assert not {"it_ran", "simulated.csv"} & {file.name for file in tmp_path.iterdir()}
+    assert not {"it_ran", "simulated.csv"} & {file.name for file in workplace.iterdir()}
     said = capsys.readouterr().err
     assert ("with --trust" in said) == (not words)
     assert words or "rig.py:forces" in said or "sh -c" in said
@@ -196,9 +194,8 @@ def test_a_model_file_runs_no_code_by_itself(tmp_path, monkeypatch, capsys, own,
     assert Path("it_ran").exists()
 
 
-def test_trust_needs_code_that_it_trusts(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "model.toml").write_text(MODEL + SIMULATOR)
+def test_trust_needs_code_that_it_trusts(workplace, capsys):
+    (workplace / "model.toml").write_text(MODEL + SIMULATOR)
     assert main(["design-runs", "model.toml", "--trust"]) == 2
     assert "neither python nor command" in capsys.readouterr().err
 
@@ -250,14 +247,13 @@ def test_runs_that_cannot_stand_in_for_equations_are_refused(folder, tmp_path):
          "for the same run; fix its seed"),
     ],
 )  # fmt: skip
-def test_simulators_that_fail_are_one_line(tmp_path, monkeypatch, capsys, body, said):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "rig.py").write_text(f"def forces(design):\n    {body}\n")
-    (tmp_path / "model.toml").write_text(MODEL + SIMULATOR + 'python = "rig.py:forces"\n')
+def test_simulators_that_fail_are_one_line(workplace, capsys, body, said):
+    (workplace / "rig.py").write_text(f"def forces(design):\n    {body}\n")
+    (workplace / "model.toml").write_text(MODEL + SIMULATOR + 'python = "rig.py:forces"\n')
     assert main(["design-runs", "model.toml", "--trust", "--count", "40"]) == 2
     captured = capsys.readouterr()
     assert said in captured.err and captured.err.count("\n") == 1
-    assert not (tmp_path / "simulated.csv").exists()
+    assert not (workplace / "simulated.csv").exists()
 
 
 def test_rows_outside_the_runs_are_refused(folder, tmp_path, capsys):

@@ -115,8 +115,7 @@ def test_the_probe_detects_a_runtime_with_other_results(estimator, tmp_path, sma
         Estimator.load(signed(small_model, tmp_path / "other.onnx", probe=json.dumps(probe)))
 
 
-def test_a_short_name_is_a_file_or_a_released_one(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_short_name_is_a_file_or_a_released_one(workplace):
     assert find_model("wheel") == released_models()["wheel"]
     for path in ("folder/wheel", "wheel.onnx", Path("folder") / "wheel"):
         assert find_model(path) == Path(path)  # that it is missing is said when it is opened

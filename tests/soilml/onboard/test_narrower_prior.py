@@ -90,13 +90,12 @@ def test_readings_that_contradict_it_are_flagged(rover):
     assert found.abstains.all()
 
 
-def test_the_command_takes_a_narrower_prior_of_the_case(tmp_path, model_file, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_the_command_takes_a_narrower_prior_of_the_case(workplace, model_file, capsys):
     wheel = model_file.read_text()
-    (tmp_path / "narrow.toml").write_text(wheel.replace("3000.0", "700.0"))
+    (workplace / "narrow.toml").write_text(wheel.replace("3000.0", "700.0"))
     rows = readings(np.random.default_rng(5), [600.0, 0.6, 0.015], 8)
     columns = dict(zip(("slip", "load_N", "torque_Nm"), rows.values(), strict=True))
-    (tmp_path / "runs.csv").write_text(csv_text({"run": ["a"] * 8} | columns))
+    (workplace / "runs.csv").write_text(csv_text({"run": ["a"] * 8} | columns))
     std = {}
     for case in ("model.toml", "narrow.toml"):
         command = ["estimate", "wheel", "runs.csv", "--model", case, "--by", "run"]

@@ -10,12 +10,7 @@ from soilml import SlipSinkage, read_case
 from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
-from training.adaptation.campaign import (
-    DrivenRange,
-    recipe_text,
-    split_runs,
-    within_carried_loads,
-)
+from training.adaptation.campaign import DrivenRange, recipe_text, split_runs, within_carried_loads
 from training.set_posterior.families.recipe_family import RecipeFamily
 
 

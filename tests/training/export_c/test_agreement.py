@@ -11,7 +11,7 @@ multiple of the former.
 
 import numpy as np
 import pytest
-from compiled_c import COMPILERS, ROOT
+from compiled_c import COMPILERS
 from simulated_rows import context_of, rows_of
 
 from soilml import Estimator
@@ -37,7 +37,7 @@ SETS = ["wheel", "any_wheel", "wheel_small", "any_wheel_small"]
 
 
 def estimator_of(name, context):
-    estimator = Estimator.load(ROOT / "exported" / f"{name}.onnx")
+    estimator = Estimator.load(name)
     return estimator.on(**context) if context else estimator
 
 

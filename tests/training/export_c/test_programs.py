@@ -10,10 +10,7 @@ from compiled_c import COMPILERS, ROOT, WARNINGS
 from simulated_rows import rows_of
 from test_agreement import ONE_FIRST
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not COMPILERS, reason="no C compiler"),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILERS, reason="no C compiler")]
 EXAMPLES = ROOT / "examples" / "board"
 SANITIZERS = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 FIELDS = ("slip", "torque", "load", "sinkage", "drawbar_pull")

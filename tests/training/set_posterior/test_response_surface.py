@@ -10,11 +10,7 @@ from soilml.errors import InputError
 from soilml.numerics.prior import Prior
 from soilml.quantities import SHEAR
 from training.set_posterior.families.recipe_family import RecipeFamily
-from training.set_posterior.response_surface import (
-    ResponseSettings,
-    check_equilibria,
-    fit_response,
-)
+from training.set_posterior.response_surface import ResponseSettings, check_equilibria, fit_response
 
 
 def errors(family, response, designs, soils):
