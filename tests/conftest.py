@@ -179,8 +179,6 @@ SET_NOISE = {"torque": [0.0, 0.02], "sinkage": [0.0005, 0.05], "drawbar_pull": [
 
 
 def _exported(folder: Path, posterior) -> Path:
-    from dataclasses import replace
-
     from training.export.model_file import export_any_wheel
     from training.set_posterior.response_surface import ResponseSettings
     from training.spec import AnyWheelSpec
@@ -271,8 +269,6 @@ FILE_NOISE = {"torque": [0.01, 0.02], "torque_bias": [0.0, 0.01], "sinkage": [0.
 @pytest.fixture(scope="session")
 def whole_file(small_data: Path, wheel_posterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A file with estimates of single readings and a set posterior, as `wheel.onnx` is."""
-    from dataclasses import replace
-
     from training.dataset import read_dataset
     from training.export.model_file import export_model
     from training.spec import read_spec
