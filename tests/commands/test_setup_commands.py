@@ -32,8 +32,8 @@ def test_the_first_model_file_is_one(tmp_path, capsys, soil, rover):
 def test_models_lists_them(capsys):
     assert main(["models"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert set(released_models()) <= {line.split()[0] for line in lines}
-    assert any(line.startswith("wheel ") and "r 0.15, w 0.12" in line for line in lines)
+    assert set(released_models()) <= {line.partition(" ")[0] for line in lines}
+    assert any(line.startswith("wheel ") and "wheel 150, 120" in line for line in lines)
     assert max(map(len, lines)) <= 110
 
 
