@@ -39,7 +39,7 @@ LEAST_STEP_NOISE, STEP_TOLERANCE, STEP_READINGS, STEP_LEVELS = 0.3, 1e-3, 6, 3
 SAME_COLUMN_ROWS = 4
 #: Rows from which a run that repeats another one exactly is a copy: fewer can agree by chance.
 COPIED_ROWS = 3
-#: Share of rows or readings that are left out from which the remark is a warning.
+#: Share of repeated rows from which the remark is a warning.
 MANY = 0.2
 _NAMES = ("source", "run", "status")  # Columns in which copies may differ
 MOST_LINES = 8  # Rows that a remark names one by one
@@ -154,16 +154,27 @@ def _without_repeated_rows(table: Table, noise: dict[str, float]) -> tuple[Table
 
 
 def _clipped(table: Table, key: str, noise: float) -> tuple[Booleans, str]:
-    """Readings of a column at an end of its range that a sensor or amplifier does not exceed."""
-    values = table[key]
-    levels, count = np.unique(values[np.isfinite(values)], return_counts=True)
+    """Readings of a column at an end of its range that a sensor or amplifier does not exceed.
+
+    The range is that of all rows; also that of each run, as a gain may be set for it, where noise
+    hardly makes equal readings.
+    """
+    groups, does = [np.ones(len(table), bool)], "clips"
+    if "run" in table and _chance(table[key], noise) * len(table) <= BY_CHANCE:
+        groups += [table["run"] == run for run in np.unique(table["run"])]
     spoilt, ends = np.zeros(len(table), bool), list[str]()
-    if levels.size > CLIPPED_ROWS:
+    for i, group in enumerate(groups):
+        values = np.where(group, table[key], np.nan)
+        levels, count = np.unique(values[np.isfinite(values)], return_counts=True)
+        if levels.size <= CLIPPED_ROWS:
+            continue
         for end, others in ((0, count[1:]), (-1, count[:-1])):
             if count[end] >= max(CLIPPED_ROWS, CLIPPED_RATIO * int(others.max()) + 1):
+                if i > 0 and not spoilt[values == levels[end]].all():
+                    does = "clips or holds"
                 spoilt |= values == levels[end]
                 ends.append(f"{levels[end]:.6g}")
-    return spoilt, f"exactly {' or '.join(ends)}: the sensor clips there"
+    return spoilt, f"exactly {' or '.join(dict.fromkeys(ends))}: the sensor {does} there"
 
 
 def _held(table: Table, key: str, noise: float) -> tuple[Booleans, str]:
@@ -195,7 +206,7 @@ def _left_out(code: str, table: Table, key: str, spoilt: Booleans, text: str) ->
     where += f" and {rows.size - MOST_LINES} more" if rows.size > MOST_LINES else ""
     are = "1 reading is" if rows.size == 1 else f"{rows.size} readings are"
     text = f"{key}: {are} left out ({where}), {text}"
-    return Remark(code, text, (key,), _severity(rows.size, table))
+    return Remark(code, text, (key,), "warning")
 
 
 def _severity(count: int, table: Table) -> Severity:

@@ -160,7 +160,9 @@ def _faults(report: GapReport) -> str:
 
 
 def _agreement(report: GapReport) -> str:
-    declared = report.model.discrepancy
+    declared = any(not one.learned for one in report.model.discrepancy.values())
+    if report.misfit is not None:
+        declared = report.misfit.with_discrepancy
     p = f"probability of a gap {format_probability(report.gap_probability)}."
     if report.misfit is not None and report.misfit.grants_scatter:
         beside = " and declared discrepancy" if declared else ""

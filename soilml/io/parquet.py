@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -15,6 +16,8 @@ from soilml.errors import TableError
 from soilml.io.bounds import COLUMNS, ROWS, TABLE_VALUES, TEXT_BYTES, Bound
 from soilml.io.table import TEXT, Column, text_column
 from soilml.optional_imports import need
+
+_INDEX = re.compile(r"__index_level_\d+__")  # As pandas names it in Arrow tables and Parquet files
 
 
 def read_parquet(path: Path, most: Bound = TABLE_VALUES) -> tuple[dict[str, Any], dict[str, str]]:
@@ -56,10 +59,18 @@ def arrow_columns(frame: ArrowStream) -> dict[str, Any]:
     need("pyarrow", "", what="reading a data frame")
     import pyarrow as pa
 
-    arrow = pa.table(frame)
+    try:
+        arrow = pa.table(frame)
+    except ValueError as error:  # among others of pandas, for a column that occurs twice
+        raise TableError(f"data frame: {error}") from None
     if len(set(arrow.column_names)) < len(arrow.column_names):
         raise TableError("data frame: a column occurs twice")
     return dict(zip(arrow.column_names, arrow.columns, strict=True))
+
+
+def without_index(found: Mapping[str, Any]) -> dict[str, Any]:
+    """The columns but those in which pandas exports an index without a name."""
+    return {name: column for name, column in found.items() if not _INDEX.fullmatch(name)}
 
 
 def _check_sizes(path: Path, found: Any, most: Bound) -> None:

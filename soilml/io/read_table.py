@@ -15,7 +15,14 @@ from numpy.typing import ArrayLike
 from soilml.errors import TableError
 from soilml.io.atomic_files import refuse_device
 from soilml.io.csv_file import read_csv, read_sheet
-from soilml.io.parquet import ArrowStream, arrow_columns, own_columns, plain_column, read_parquet
+from soilml.io.parquet import (
+    ArrowStream,
+    arrow_columns,
+    own_columns,
+    plain_column,
+    read_parquet,
+    without_index,
+)
 from soilml.io.spreadsheet import is_spreadsheet, split_sheet
 from soilml.io.table import TEXT, Column, Table, text_column
 from soilml.quantities import COLUMNS
@@ -190,6 +197,7 @@ def _of_arrow(
     file: Path, found: Mapping[str, Any], ignore_extra: bool, metadata: dict[str, str] | None = None
 ) -> Table:
     """The table of Arrow columns, of a file where there is metadata."""
+    found = without_index(found)
     kept = known_columns(file, list(found), ignore_extra, own_columns(metadata or {}))
     columns = {name: plain_column(file, name, found[name]) for name in kept}
     rows = 0 if metadata is None or not found else len(next(iter(found.values())))

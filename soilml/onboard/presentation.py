@@ -83,11 +83,15 @@ def verdict(columns: Mapping[str, Any], by: str | None, remarks: Sequence[Remark
     what = f"{by or 'row'}{'' if known.size == 1 else 's'}" if by != "all" else "set of all rows"
     are = "is" if known.size == 1 else "are"
     head = f"{int(known.sum())} of {known.size} {what} {are} estimated"
-    if any(remark.code == "rows-disagree" for remark in remarks):
+    if not {"rows-disagree", "inconsistent"}.isdisjoint(remark.code for remark in remarks):
         return f"{head}; rows disagree with the model: run `soilml gap`."
     vague = [name for remark in remarks if remark.code == "not-identified" for name in remark.about]
     names = " and ".join(_words(name) for name in dict.fromkeys(vague))
-    return f"{head}; {names} mostly from the prior." if vague else f"{head}."
+    if vague:
+        return f"{head}; {names} mostly from the prior."
+    outside = any(remark.code == "out-of-range" for remark in remarks)
+    rest = "the others are" if known.any() else "it is" if known.size == 1 else "they are"
+    return f"{head}; {rest} outside what the file was trained for." if outside else f"{head}."
 
 
 def _words(name: str) -> str:

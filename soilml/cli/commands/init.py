@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from soilml.cli.option_values import whole_number_from
 from soilml.errors import InputError, did_you_mean
 from soilml.io.atomic_files import save_text
 from soilml.io.cell_text import is_number, read_number
+from soilml.report.numbers import significant
+
+if TYPE_CHECKING:
+    from soilml.physics.soils import SoilEntry
 
 DESCRIPTION = """\
 Write a model file to begin with: the wheel, a soil with wide priors, the noise
@@ -28,6 +34,12 @@ LENGTHS = {
     "wheelbase": "distance of the first axle from the last",
     "track": "distance of the left wheels from the right ones",
     "height": "height of the centre of mass above the ground",
+}
+#: Prior ranges of most soils; the value of --soil widens them.
+_PRIORS = {
+    "cohesion": (0.0, 5000.0),  # Pa
+    "friction_angle": (0.35, 0.8),  # rad
+    "shear_modulus": (0.003, 0.05),  # m
 }
 ARGUMENTS = (
     ("out MODEL.toml", "the file to write"),
@@ -103,7 +115,7 @@ def _text(sizes: dict[str, float], name: str | None, noise: str, rover: str | No
     parts = [
         "# Model file of soilml; docs/reference/model-file.md explains every section. SI units.",
         f'[gear]\ntype = "wheel"\nradius = {sizes["radius"]} # m\nwidth = {sizes["width"]} # m',
-        _soil(name),
+        _soil(None if name is None else catalogue[name]),
         "[noise] # standard deviations of the sensors: of the reading, in its unit, or both\n"
         f"torque_Nm = {written}\n"
         '# drawbar_pull_N = "2 % + 0.5"\n# sinkage_m = 0.001\n# slip = 0.01\n# load_N = "1 %"',
@@ -119,15 +131,19 @@ def _text(sizes: dict[str, float], name: str | None, noise: str, rover: str | No
     return "\n\n".join(parts) + "\n"
 
 
-def _soil(name: str | None) -> str:
+def _soil(soil: SoilEntry | None) -> str:
+    """The tables of the soil; without one, the bearing of a start is unknown too."""
+    ranges = {name: _range(name, soil) for name in _PRIORS}
+    low, high = ranges["friction_angle"]
     shear = (
-        "cohesion = [0.0, 5000.0] # Pa\n"
-        "friction_angle = [0.35, 0.80] # rad, 20 to 46 degrees\n"
-        'shear_modulus = { range = [0.003, 0.05], scale = "log" } # m'
+        f"cohesion = {list(ranges['cohesion'])} # Pa\n"
+        f"friction_angle = {[low, high]} # rad, {math.degrees(low):.0f} to "
+        f"{math.degrees(high):.0f} degrees\n"
+        f'shear_modulus = {{ range = {list(ranges["shear_modulus"])}, scale = "log" }} # m'
     )
-    if name is not None:
+    if soil is not None:
         return (
-            f'[soil]\nname = "{name}" # bearing as published; shear strength is identified\n\n'
+            f'[soil]\nname = "{soil.name}" # bearing as published; shear strength is identified\n\n'
             f"[soil.prior]\n{shear}"
         )
     return (
@@ -136,6 +152,16 @@ def _soil(name: str | None) -> str:
         'kphi = { range = [2e5, 5e6], scale = "log" } # N/m^(n+2): measure sinkage or pull too\n'
         "n = [0.6, 1.4]"
     )
+
+
+def _range(name: str, soil: SoilEntry | None) -> tuple[float, float]:
+    """The prior range of a parameter, which reaches beyond the published value."""
+    low, high = _PRIORS[name]
+    if soil is None:
+        return low, high
+    value = float(getattr(soil.soil, name))
+    low = low if value >= 1.1 * low else float(significant(0.5 * value, 2))
+    return low, high if value <= 0.9 * high else float(significant(1.2 * value, 2))
 
 
 def _rover(args: argparse.Namespace) -> str:

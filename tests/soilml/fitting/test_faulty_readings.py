@@ -70,6 +70,18 @@ def test_a_torque_that_is_clipped_is_left_out_and_suspects_no_effect(case):
     np.testing.assert_array_equal(values_of(fits[0]), values_of(fits[1]))
 
 
+def test_a_torque_that_is_clipped_in_one_run_is_left_out_of_that_run(case):
+    table = driven(case)
+    order = np.random.default_rng(3).permutation(32)
+    torque = table["torque_Nm"].copy()
+    torque[8:16] = np.minimum(torque[8:16], np.sort(torque[8:16])[-4])
+    assert torque.max() > torque[8:16].max()
+    fit = identify(case, changed(table, torque_Nm=torque).rows(order))
+    (remark,) = [n for n in fit.warnings if n.code in ("clipped-readings", "held-readings")]
+    assert "4 readings are left out" in remark.text and "clips or holds" in remark.text
+    assert f"{torque[8:16].max():.6g}" in remark.text and remark.severity == "warning"
+
+
 def test_a_reading_that_a_logger_held_is_left_out_with_its_rows(case):
     table = driven(case)
     torque = table["torque_Nm"].copy()

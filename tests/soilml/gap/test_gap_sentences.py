@@ -58,6 +58,10 @@ def test_agreement_is_within_the_noise_and_what_was_declared():
     assert said("no-gap").endswith(expected)
     declared = replace(case_of(), discrepancy={"torque_Nm": Discrepancy(share=0.02)})
     assert "within the noise and the declared discrepancy:" in said("no-gap", model=declared)
+    learned = {"torque_Nm": Discrepancy(constant=0.02, learned=True)}
+    assert said("no-gap", model=replace(case_of(), discrepancy=learned)).endswith(expected)
+    found = said("no-gap", model=replace(case_of(), discrepancy=learned), misfit=SCATTER)
+    assert found.startswith("No gap beyond noise, with a scatter")
 
 
 def test_granted_scatter_is_named_with_its_size():

@@ -48,3 +48,13 @@ def test_a_table_goes_back_to_arrow():
     again = read_table(table.to_arrow())
     assert again["run"].tolist() == table["run"].tolist()
     assert np.array_equal(again["torque_Nm"], table["torque_Nm"], equal_nan=True)
+
+
+def test_a_selection_of_a_frame_of_pandas_and_its_file_are_read_without_their_index(tmp_path):
+    pd = pytest.importorskip("pandas")
+    frame = pd.DataFrame(COLUMNS).iloc[[0, 2]].set_index(pd.Index([7, 7]))
+    frame.to_parquet(tmp_path / "runs.parquet")
+    for rows in (frame, tmp_path / "runs.parquet"):
+        assert read_table(rows)["slip"].tolist() == [0.1, 0.3]
+    with pytest.raises(TableError, match="Duplicate column names"):
+        read_table(pd.concat([frame, frame[["slip"]]], axis=1))
