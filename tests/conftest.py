@@ -25,6 +25,7 @@ from shared_files import shared_folder
 from slip_step_fixtures import slip_case as slip_case
 from slip_step_fixtures import slip_drive as slip_drive
 from slip_step_fixtures import slip_files as slip_files
+from slip_step_fixtures import slip_in_c as slip_in_c
 from slip_step_fixtures import slip_stream as slip_stream
 
 #: The reference wheel on dry sand.
@@ -140,6 +141,13 @@ def case(model_file: Path):
     return read_case(model_file)
 
 
+@pytest.fixture
+def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of the test's own, in which it works."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
 @pytest.fixture(scope="session")
 def small_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Some thousand rows, a quarter of them in runs of 32."""
@@ -174,16 +182,18 @@ def small_model(small_data: Path, tmp_path_factory: pytest.TempPathFactory) -> P
 
 #: What a set of readings may be off by, generously: nothing of it is measured here.
 LENIENT = ((1.0, 8.0, 64.0, 512.0), (15.0, 30.0, 120.0, 700.0))
+#: Noise of the sensors in the files of sets.
+SET_NOISE = {"torque": [0.0, 0.02], "sinkage": [0.0005, 0.05], "drawbar_pull": [0.5, 0.03]}
 
 
-def _exported(folder: Path, family, posterior, noise) -> Path:
+def _exported(folder: Path, posterior) -> Path:
     from training.export.model_file import export_any_wheel
     from training.set_posterior.response_surface import ResponseSettings
     from training.spec import AnyWheelSpec
 
     path = folder / "small.onnx"
-    spec = AnyWheelSpec(family, ResponseSettings(0, 0, 0, 0), noise, "{}")
-    export_any_wheel(spec, replace(posterior, noise=noise), {}, path)
+    spec = AnyWheelSpec(posterior.family, ResponseSettings(0, 0, 0, 0), SET_NOISE, "{}")
+    export_any_wheel(spec, replace(posterior, noise=SET_NOISE), {}, path)
     return path
 
 
@@ -218,9 +228,15 @@ def wheel_posterior(tmp_path_factory: pytest.TempPathFactory):
 @pytest.fixture(scope="session")
 def wheel_set_file(wheel_posterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same as a model file, without regressors of single readings."""
-    noise = {"torque": [0.0, 0.02], "sinkage": [0.0005, 0.05], "drawbar_pull": [0.5, 0.03]}
-    folder = tmp_path_factory.mktemp("wheel_set")
-    return _exported(folder, wheel_posterior.family, wheel_posterior, noise)
+    return _exported(tmp_path_factory.mktemp("wheel_set"), wheel_posterior)
+
+
+@pytest.fixture(scope="session")
+def wheel_sets(wheel_set_file: Path):
+    """Its estimator."""
+    from soilml import Estimator
+
+    return Estimator.load(wheel_set_file)
 
 
 @pytest.fixture(scope="session")
@@ -239,8 +255,7 @@ def any_posterior(tmp_path_factory: pytest.TempPathFactory):
 @pytest.fixture(scope="session")
 def any_set_file(any_posterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same as a model file."""
-    noise = {"torque": [0.0, 0.02], "sinkage": [0.0005, 0.05], "drawbar_pull": [0.5, 0.03]}
-    return _exported(tmp_path_factory.mktemp("any_set"), any_posterior.family, any_posterior, noise)
+    return _exported(tmp_path_factory.mktemp("any_set"), any_posterior)
 
 
 def simulated_run(posterior, rows, seed=0, x=(0.2, -0.3, 0.1)):
@@ -262,8 +277,6 @@ FILE_NOISE = {"torque": [0.01, 0.02], "torque_bias": [0.0, 0.01], "sinkage": [0.
 @pytest.fixture(scope="session")
 def whole_file(small_data: Path, wheel_posterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A file with estimates of single readings and a set posterior, as `wheel.onnx` is."""
-    from dataclasses import replace
-
     from training.dataset import read_dataset
     from training.export.model_file import export_model
     from training.spec import read_spec

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 SLIP_EXAMPLE = Path(__file__).parents[1] / "examples" / "slip"
@@ -39,3 +40,44 @@ def slip_stream(slip_files):
     from soilml.onboard.slip_stream import SlipStream
 
     return SlipStream.load(slip_files / "rover.onnx")
+
+
+@pytest.fixture(scope="session")
+def slip_in_c(slip_files):
+    """The C file, compiled."""
+    from compiled_c import COMPILERS, CompiledModel, compile_library
+
+    if not COMPILERS:
+        pytest.skip("no C compiler")
+    library = compile_library(slip_files / "rover.c", slip_files / "rover.so", COMPILERS[0], "-O2")
+    return CompiledModel(slip_files / "rover.h", library)
+
+
+def slip_row(slip_drive, i, **changed):
+    """Row `i` of the drive; `changed` replaces one number, that of the first wheel."""
+    row = {name: getattr(slip_drive, name)[i].copy() for name in ("rim_speed", "torque", "load")}
+    row |= {"slope": float(slip_drive.slope[i]), "elapsed": 1.0}
+    for name, value in changed.items():
+        if np.ndim(row[name]):
+            row[name][0] = value
+        else:
+            row[name] = value
+    return row
+
+
+class DrivenInC:
+    """A state of the C file along rows."""
+
+    def __init__(self, model):
+        self.model, self.state = model, model.new("state")
+        model.call("start", self.state)
+
+    def step(self, row):
+        """Code and estimate."""
+        own, answer = self.model.new("row"), self.model.new("estimate")
+        for name, value in row.items():
+            if np.ndim(value):
+                getattr(own, name)[:] = value
+            else:
+                setattr(own, name, value)
+        return self.model.call("step", self.state, own, answer, self.model.work), answer

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import THREE_CHANNEL_MODEL
+from console import refused
 
 import soilml
 from soilml import SlipSinkage, read_case, simulate
@@ -54,24 +55,16 @@ def write_log(folder, *effects, loads=(40.0, 60.0, 80.0, 100.0, 120.0, 50.0), pr
     return ["adapt", str(folder / "model.toml"), str(folder / "runs.csv")]
 
 
-def error_of(capsys, words):
-    """The one line of a command that must fail with status 2."""
-    assert main(words) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert len([line for line in lines if line.startswith("soilml")]) == 1
-    return lines[-1]
-
-
 def test_errors_are_one_line_and_leave_nothing(tmp_path, capsys):
     words = [*write_log(tmp_path), "--out", str(tmp_path / "out")]
     missing = str(tmp_path / "none.onnx")
-    assert "none.onnx" in error_of(capsys, [*words, "--against", missing])
+    refused([*words, "--against", missing], capsys, "none.onnx")
     (tmp_path / "soil.toml").write_text("[gear]\n")
-    assert "[soil] is missing" in error_of(capsys, [*words, "--soil", str(tmp_path / "soil.toml")])
+    refused([*words, "--soil", str(tmp_path / "soil.toml")], capsys, "[soil] is missing")
     model = tmp_path / "model.toml"
     model.write_text(model.read_text().replace("[gear]", "[gears.one]"))
-    assert "several gears (one)" in error_of(capsys, words)
-    assert "from 2000" in error_of(capsys, [*words, "--rows", "10"])
+    refused(words, capsys, "several gears (one)")
+    refused([*words, "--rows", "10"], capsys, "from 2000")
     assert not (tmp_path / "out").exists()
 
 

@@ -1,10 +1,10 @@
 """`soilml climb`: from a rover's files to the slope that it can climb."""
 
-import csv
 import json
 
 import numpy as np
 import pytest
+from console import refused, rows_of
 
 from soilml.cli import main
 from soilml.io.text_tables import csv_text
@@ -43,12 +43,11 @@ def tables(true):
 
 
 @pytest.fixture
-def folder(tmp_path, tables, monkeypatch):
-    (tmp_path / "rover.toml").write_text(ROVER)
-    (tmp_path / "runs.csv").write_text(csv_text(tables[0]))
-    (tmp_path / "stress.csv").write_text(csv_text(tables[1]))
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+def folder(workplace, tables):
+    (workplace / "rover.toml").write_text(ROVER)
+    (workplace / "runs.csv").write_text(csv_text(tables[0]))
+    (workplace / "stress.csv").write_text(csv_text(tables[1]))
+    return workplace
 
 
 @pytest.mark.slow
@@ -76,9 +75,7 @@ def test_a_folder_receives_report_curve_and_climbs(folder, capsys):
     assert sorted(f.name for f in (folder / "found").iterdir()) == [
         "climb.json", "climbs.csv", "curve.csv", "report.html",
     ]  # fmt: skip
-    with (folder / "found" / "curve.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    for row in rows:
+    for row in rows_of((folder / "found" / "curve.csv").read_text()):
         low, middle, high = (float(row[f"slope_rad{end}"]) for end in ("_p05", "", "_p95"))
         assert low <= middle <= high
 
@@ -142,15 +139,6 @@ FAULTS = {
 }
 
 
-def refused(folder, capsys, message, command=COMMAND):
-    before = sorted(p.name for p in folder.rglob("*"))
-    assert main([*command, "--out", "found"]) == 2
-    captured = capsys.readouterr()
-    assert message in captured.err.strip().splitlines()[-1], captured.err
-    assert captured.out == ""
-    assert sorted(p.name for p in folder.rglob("*")) == before
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_invalid_tables_are_refused_in_one_line(folder, tables, capsys, fault):
@@ -158,7 +146,7 @@ def test_invalid_tables_are_refused_in_one_line(folder, tables, capsys, fault):
     runs, stress = change(*tables)
     (folder / "runs.csv").write_text(csv_text(runs))
     (folder / "stress.csv").write_text(csv_text(stress))
-    refused(folder, capsys, message)
+    refused([*COMMAND, "--out", "found"], capsys, message, folder)
 
 
 ROVER_FAULTS = {
@@ -176,4 +164,4 @@ ROVER_FAULTS = {
 def test_invalid_rover_files_are_refused_in_one_line(folder, capsys, fault):
     text, message = ROVER_FAULTS[fault]
     (folder / "rover.toml").write_text(text)
-    refused(folder, capsys, message)
+    refused([*COMMAND, "--out", "found"], capsys, message, folder)

@@ -1,45 +1,24 @@
 """The command line's contract: arguments, columns, units, exit status."""
 
-import csv
-import io
 import json
 
 import numpy as np
 import pytest
 from conftest import RECIPE
+from console import printed, rows_of, rows_printed
 
 from soilml.cli import main
-
-
-def rows_of(text):
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 @pytest.fixture
 def runs_file(tmp_path, model_file, capsys):
     """Fifteen simulated rows in two runs."""
-    assert (
-        main(
-            [
-                "simulate",
-                str(model_file),
-                "--slip",
-                "0.1:0.5:5",
-                "--load",
-                "40,70,100",
-                "--format",
-                "csv",
-            ]
-        )
-        == 0
-    )
-    rows = rows_of(capsys.readouterr().out)
-    path = tmp_path / "runs.csv"
+    words = ["simulate", model_file, "--slip", "0.1:0.5:5", "--load", "40,70,100"]
     lines = ["run,slip,load_N,torque_Nm"]
-    for i, r in enumerate(rows):
+    for i, r in enumerate(rows_printed(words, capsys)):
         lines.append(f"run_{i // 8},{r['slip']},{r['load_N']},{r['torque_Nm']}")
-    path.write_text("\n".join(lines) + "\n")
-    return path
+    (tmp_path / "runs.csv").write_text("\n".join(lines) + "\n")
+    return tmp_path / "runs.csv"
 
 
 def test_simulate_writes_the_promised_columns(model_file, tmp_path, capsys):
@@ -52,17 +31,12 @@ def test_simulate_writes_the_promised_columns(model_file, tmp_path, capsys):
     ]  # fmt: skip
     assert [float(r["slip"]) for r in rows] == pytest.approx(np.linspace(0, 0.6, 13))
     assert {r["status"] for r in rows} == {"ok"}
-    capsys.readouterr()
-    assert main([*command, "--format", "csv"]) == 0
-    assert capsys.readouterr().out == out.read_text()
+    assert printed([*command, "--format", "csv"], capsys).out == out.read_text()
 
 
 def test_simulate_leaves_blanks_and_a_reason_where_there_is_no_equilibrium(model_file, capsys):
-    assert (
-        main(["simulate", str(model_file), "--slip", "0.2", "--load", "60,1e6", "--format", "csv"])
-        == 0
-    )
-    good, bad = rows_of(capsys.readouterr().out)
+    words = ["simulate", model_file, "--slip", "0.2", "--load", "60,1e6"]
+    good, bad = rows_printed(words, capsys)
     assert good["status"] == "ok"
     assert bad["torque_Nm"] == bad["sinkage_m"] == bad["drawbar_pull_N"] == ""
     assert "no equilibrium" in bad["status"]
@@ -70,12 +44,10 @@ def test_simulate_leaves_blanks_and_a_reason_where_there_is_no_equilibrium(model
 
 def test_identify_each_run_on_its_own(model_file, runs_file, capsys):
     command = ["identify", str(model_file), str(runs_file), "--method", "posterior"]
-    assert main([*command, "--by", "run", "--format", "json"]) == 0
-    content = json.loads(capsys.readouterr().out)
+    content = json.loads(printed([*command, "--by", "run", "--format", "json"], capsys).out)
     assert content["by"] == "run" and set(content["runs"]) == {"run_0", "run_1"}
     assert content["runs"]["run_0"]["rows_used"] == 8
-    assert main([*command, "--format", "json"]) == 0
-    content = json.loads(capsys.readouterr().out)
+    content = json.loads(printed([*command, "--format", "json"], capsys).out)
     assert "runs-as-one-soil" in {one["code"] for one in content["warnings"]}
 
 
@@ -90,9 +62,7 @@ def test_identify_finds_the_model_s_own_soil(model_file, runs_file, tmp_path, ca
     assert content["parameters"]["cohesion"]["value"] == pytest.approx(1040.0, rel=1e-4)
     assert content["parameters"]["friction_angle"]["unit"] == "rad"
     assert set(content) >= {"method", "parameters", "correlation", "warnings", "rows_used"}
-    capsys.readouterr()
-    assert main([*command[:-2], "--format", "json"]) == 0
-    assert json.loads(capsys.readouterr().out) == content
+    assert json.loads(printed([*command[:-2], "--format", "json"], capsys).out) == content
 
 
 @pytest.mark.slow
@@ -103,9 +73,7 @@ def test_generate_train_estimate_follow_each_other(tmp_path, runs_file, capsys):
     command = ["generate", str(tmp_path / "recipe.toml"), data, "--rows", "700", "--seed", "4"]
     assert main(command) == 0
     assert main(["train", str(tmp_path / "spec.toml"), data, model]) == 0
-    capsys.readouterr()
-    assert main(["estimate", model, str(runs_file), "--format", "csv"]) == 0
-    captured = capsys.readouterr()
+    captured = printed(["estimate", model, runs_file, "--format", "csv"], capsys)
     rows = rows_of(captured.out)
     assert len(rows) == 15
     for column in ("cohesion_Pa", "friction_angle_rad", "shear_modulus_m"):
@@ -121,16 +89,13 @@ def test_generate_train_estimate_follow_each_other(tmp_path, runs_file, capsys):
 
 
 def test_soils_and_effects_list_their_catalogues(capsys):
-    assert main(["soils"]) == 0
-    listed = capsys.readouterr().out
-    assert "wong1989/dry_sand" in listed and "kphi" in listed
-    assert main(["soils", "comin2017/es-3"]) == 0
-    assert "published as -830" in capsys.readouterr().out
-    assert main(["soils", "--format", "json"]) == 0
-    assert json.loads(capsys.readouterr().out)["wong1989/dry_sand"]["values"]["n"] == 1.1
-    assert main(["effects"]) == 0
-    listed = capsys.readouterr().out
-    for name in ("slip-sinkage", "grousers", "exit-angle", "bulldozing"):
-        assert name in listed
-    assert main(["effects", "grousers"]) == 0
-    assert "height" in capsys.readouterr().out
+    for words, names in {
+        "soils": ("wong1989/dry_sand", "kphi"),
+        "soils comin2017/es-3": ("published as -830",),
+        "effects": ("slip-sinkage", "grousers", "exit-angle", "bulldozing"),
+        "effects grousers": ("height",),
+    }.items():
+        listed = printed(words.split(), capsys).out
+        assert all(name in listed for name in names)
+    listed = json.loads(printed(["soils", "--format", "json"], capsys).out)
+    assert listed["wong1989/dry_sand"]["values"]["n"] == 1.1

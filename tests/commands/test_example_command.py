@@ -1,6 +1,7 @@
 """`soilml example`: each example runs through the command that it names."""
 
 import pytest
+from console import refused
 
 from soilml import gap
 from soilml.cli import main
@@ -17,8 +18,7 @@ def test_the_campaign_has_an_effect_that_its_model_lacks(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_the_log_is_imported_by_the_map_that_is_guessed(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_the_log_is_imported_by_the_map_that_is_guessed(workplace, capsys):
     assert main(["example", "log", "."]) == 0
     assert main(["import", "--init", "rig.csv", "--out", "map.toml"]) == 0
     assert main(["import", "rig.csv", "--map", "map.toml", "--out", "runs.csv"]) == 0
@@ -28,19 +28,15 @@ def test_the_log_is_imported_by_the_map_that_is_guessed(tmp_path, monkeypatch, c
 
 
 @pytest.mark.slow
-def test_the_rover_answers_for_slopes(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_the_rover_answers_for_slopes(workplace, capsys):
     assert main(["example", "rover", "."]) == 0
     assert main(["pull", "rover.toml", "runs.csv", "--slope", "0,10", "--format", "table"]) == 0
     assert "slope, deg" in capsys.readouterr().out
 
 
-def test_examples_replace_nothing_and_name_each_other(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "model.toml").write_text("mine")
-    assert main(["example", "."]) == 2
-    assert "model.toml exists; give another folder" in capsys.readouterr().err
-    assert (tmp_path / "model.toml").read_text() == "mine"
+def test_examples_replace_nothing_and_name_each_other(workplace, capsys):
+    (workplace / "model.toml").write_text("mine")
+    refused(["example", "."], capsys, "model.toml exists; give another folder", workplace)
     assert main(["example", "campain", "x"]) == 2
     said = capsys.readouterr().err
     assert "did you mean 'campaign'" in said and all(name in said for name in EXAMPLES)
@@ -56,30 +52,24 @@ def test_examples_replace_nothing_and_name_each_other(tmp_path, monkeypatch, cap
         ("track", "The model fits these rows"),
     ],
 )
-def test_the_chain_of_a_paper_runs_on_its_example(name, said, tmp_path, monkeypatch, capsys):
+def test_the_chain_of_a_paper_runs_on_its_example(name, said, workplace, capsys):
     """The command that is printed, with its picture where it draws one; the truth is found."""
-    monkeypatch.chdir(tmp_path)
     assert main(["example", name, "."]) == 0
     command = capsys.readouterr().out.partition("Next: soilml ")[2].replace("./", "").split()
     picture = [] if name == "climb" else ["--picture", "x.png"]
     assert main([*command, *picture, "--format", "table"]) == 0
     assert said in capsys.readouterr().out
-    assert name == "climb" or (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")
+    assert name == "climb" or (workplace / "x.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_log_of_a_track_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_a_log_of_a_track_is_refused_in_one_line(workplace, capsys):
     assert main(["example", "track", "."]) == 0
-    capsys.readouterr()
     command = ["paper", "track", "model.toml", "log.csv", "--mass", "130"]
-    rows = (tmp_path / "log.csv").read_text().splitlines()
-    (tmp_path / "short.csv").write_text("\n".join(rows[:60]) + "\n")
+    rows = (workplace / "log.csv").read_text().splitlines()
+    (workplace / "short.csv").write_text("\n".join(rows[:60]) + "\n")
     for words, expected in (
         (command, "give their spacing"),
         ([*command, "--spacing", "0.6", "--grousers", "1,2"], "needed are pitch, tip, f_g and j_k"),
         ([*command[:3], "short.csv", *command[4:], "--spacing", "0.6"], "run pull_1: signal has"),
     ):
-        assert main([*words, "--out", "x.csv"]) == 2
-        said = capsys.readouterr().err.strip().splitlines()[-1]
-        assert expected in said
-        assert not (tmp_path / "x.csv").exists()
+        refused([*words, "--out", "x.csv"], capsys, expected, workplace)

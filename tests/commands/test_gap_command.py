@@ -1,8 +1,7 @@
 """`soilml gap`: four files, exit statuses, and what is refused."""
 
-import csv
-import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +9,7 @@ from conftest import THREE_CHANNEL_MODEL as MODEL
 
 from soilml.cli import main
 from soilml.config.case import read_case
+from soilml.io.text_tables import csv_text
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
 from soilml.physics.user_effects import load_effects
@@ -21,27 +21,22 @@ FILES = ["gap.json", "model.toml", "next_runs.csv", "report.html"]
 COLUMNS = ("torque_Nm", "drawbar_pull_N", "sinkage_m")
 
 OWN = '''\
-from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar
+from dataclasses import replace
+from typing import Annotated
 
 from soilml.arrays import Real
-from soilml.physics.effects import Effect, EffectCard
 from soilml.parameters import Parameter
+from soilml.physics.effects import Effect, effect
 
 
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "cable-drag", text="a cable is dragged along", source="own", kind="rig",
+    reference={"drag": 20.0}, signs={"drawbar_pull": -1},
+    isolate="the same runs without the cable",
+)
 class CableDrag(Effect):
     """A cable that is dragged along pulls back, the more the wheel slips."""
 
-    name: ClassVar[str] = "cable-drag"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="a cable is dragged along",
-        source="own",
-        kind="rig",
-        reference={"drag": 20.0},
-        signs={"drawbar_pull": -1},
-        isolate="the same runs without the cable",
-    )
     drag: Annotated[Real, Parameter("N", 0.0, 200.0, "pull at a slip of one")] = 0.0
 
     def on_reading(self, force, scene):
@@ -50,34 +45,17 @@ class CableDrag(Effect):
 '''
 
 
-def noisy(rows, seed=0):
-    """Simulated rows (dicts of text) with the noise of the sensors, as a table with runs."""
-    rng = np.random.default_rng(seed)
-    lines = ["run,slip,load_N,torque_Nm,drawbar_pull_N,sinkage_m"]
-    for r in rows:
-        true = np.asarray([float(r[name]) for name in COLUMNS])
-        read = true + np.hypot(0.02 * true, [0.0, 0.2, 0.0]) * rng.standard_normal(3)
-        cells = [f"run_{r['load_N']}", r["slip"], r["load_N"], *map(repr, map(float, read))]
-        lines.append(",".join(cells))
-    return "\n".join(lines) + "\n"
-
-
 def driven(model_file, effects=(), loads=(40.0, 60.0, 90.0, 140.0), slips=6):
+    """Runs, one of each load, with the noise of the sensors, as the text of a table."""
     case = read_case(model_file)
-    model = case.model
-    for effect in effects:
-        model = model + effect
-    rows = []
-    for i, load in enumerate(loads):
-        slip = np.linspace(0.08, 0.6, slips)
-        force = model(case.soil, Operating(slip=slip, load=np.full(slips, load)))
-        for k in range(slips):
-            values = (force.torque[k], force.drawbar_pull[k], force.sinkage[k])
-            rows.append(dict(zip(COLUMNS, values, strict=True)) | {"i": i})
-            rows[-1] |= {"slip": f"{slip[k]:.6g}", "load_N": f"{load:g}"}
-    text = noisy(rows).splitlines()
-    lines = [f"r{r['i']}," + line.partition(",")[2] for r, line in zip(rows, text[1:], strict=True)]
-    return "\n".join([text[0], *lines]) + "\n"
+    slip, load = np.tile(np.linspace(0.08, 0.6, slips), len(loads)), np.repeat(loads, slips)
+    force = replace(case.model, effects=tuple(effects))(case.soil, Operating(slip=slip, load=load))
+    true = np.stack([force.torque, force.drawbar_pull, force.sinkage], axis=1)
+    rng = np.random.default_rng(0)
+    read = true + np.hypot(0.02 * true, [0.0, 0.2, 0.0]) * rng.standard_normal(true.shape)
+    runs = np.repeat([f"r{i}" for i in range(len(loads))], slips)
+    rows = {"run": runs, "slip": slip, "load_N": load} | dict(zip(COLUMNS, read.T, strict=True))
+    return csv_text(rows)
 
 
 @pytest.fixture(scope="module")
@@ -204,20 +182,15 @@ def test_one_load_has_suspects_and_names_nothing(one_load):
 def test_an_effect_of_ones_own_is_hidden_found_and_written(inputs, tmp_path, capsys):
     own = tmp_path / "own.py"
     own.write_text(OWN)
-    true = tmp_path / "true.toml"
-    true.write_text(MODEL + '[[effect]]\nname = "cable-drag"\ndrag = 40.0\n')
-    command = ["simulate", str(true), "--slip", "0.08:0.6:8", "--load", "40,60,90,140"]
-    assert main([*command, "--effects", str(own), "--format", "csv"]) == 0
+    with_own = {**EFFECTS, **load_effects(own)}
     runs = tmp_path / "runs.csv"
-    runs.write_text(noisy(csv.DictReader(io.StringIO(capsys.readouterr().out))))
+    runs.write_text(driven(inputs / "model.toml", [with_own["cable-drag"](drag=40.0)], slips=8))
     files = (str(inputs / "model.toml"), str(runs), "--effects", str(own))
     found = analysed(inputs, tmp_path, capsys, *files)
     assert ["cable-drag"] in found["cause_set"]
     text = (tmp_path / "out" / "model.toml").read_text()
     assert 'name = "cable-drag"' in text
-    (tmp_path / "out" / "model.toml").rename(tmp_path / "found.toml")
-    with_own = {**EFFECTS, **load_effects(own)}
-    (effect,) = read_case(tmp_path / "found.toml", with_own).model.effects
+    (effect,) = read_case(tmp_path / "out" / "model.toml", with_own).model.effects
     assert effect.drag == pytest.approx(40.0, rel=0.1)
 
 

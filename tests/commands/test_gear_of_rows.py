@@ -14,16 +14,15 @@ ROWS = "run,gear,slip,load_N,torque_Nm\na,narrow,0.1,60,1\na,narrow,0.3,60,2\nb,
 
 
 @pytest.fixture
-def files(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "one.toml").write_text(MODEL)
+def files(workplace):
+    (workplace / "one.toml").write_text(MODEL)
     start = MODEL.index("[gear]")
     stop = MODEL.index("\n[", start + 1)
     gear = MODEL[start:stop]
     several = [gear.replace("[gear]", f"[gears.{name}]") for name in ("narrow", "wide")]
-    (tmp_path / "two.toml").write_text(MODEL.replace(gear, "\n".join(several)))
-    (tmp_path / "runs.csv").write_text(ROWS)
-    return tmp_path
+    (workplace / "two.toml").write_text(MODEL.replace(gear, "\n".join(several)))
+    (workplace / "runs.csv").write_text(ROWS)
+    return workplace
 
 
 def chosen(model, where=None, gear=None, rows=ROWS):

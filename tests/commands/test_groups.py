@@ -1,11 +1,10 @@
 """One answer for each run: runs that can have none, and rows that have no answer themselves."""
 
-import csv
-import io
 import json
 
 import pytest
 from conftest import MODEL
+from console import refused, rows_printed
 
 from soilml.cli import main
 
@@ -21,15 +20,10 @@ c,0.3,80,3.54,no equilibrium
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    (tmp_path / "model.toml").write_text(MODEL)
-    (tmp_path / "runs.csv").write_text(RUNS)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def rows_of(text):
-    return list(csv.DictReader(io.StringIO(text)))
+def folder(workplace):
+    (workplace / "model.toml").write_text(MODEL)
+    (workplace / "runs.csv").write_text(RUNS)
+    return workplace
 
 
 @pytest.mark.slow
@@ -41,10 +35,8 @@ def test_a_run_that_cannot_be_identified_is_named_and_the_others_are_not_lost(fo
     assert content["runs"]["c"]["rows_used"] == 1
     assert "run b has no result" in capsys.readouterr().err
     (folder / "none.csv").write_text("run,slip,load_N,torque_Nm\nx,0.1,60,\ny,0.1,60,\n")
-    assert main([*command, "none.csv", "--out", "n.json"]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1 and "run x: none.csv: no reading" in error
-    assert not (folder / "n.json").exists()
+    words = [*command, "none.csv", "--out", "n.json"]
+    refused(words, capsys, "run x: none.csv: no reading", folder)
 
 
 @pytest.mark.slow
@@ -55,7 +47,6 @@ def test_all_runs_of_one_soil_are_one_set_of_readings(folder, capsys):
     (folder / "one.csv").write_text("\n".join(renamed) + "\n")
     found = {}
     for table, by in (("runs.csv", "all"), ("one.csv", "run")):
-        assert main(["estimate", "wheel", table, "--by", by, "--format", "csv"]) == 0
-        (found[by],) = rows_of(capsys.readouterr().out)
+        (found[by],) = rows_printed(["estimate", "wheel", table, "--by", by], capsys)
         assert found[by].pop(by) == {"all": "all", "run": "x"}[by]
     assert found["all"] == found["run"] and found["all"]["rows"] == "4"

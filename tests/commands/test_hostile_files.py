@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from conftest import THREE_CHANNEL_MODEL
+from console import refused
 
 from soilml.cli import main
 from soilml.errors import InputError, TableError
@@ -20,18 +21,10 @@ MARK = 'from pathlib import Path\n\nPath("it_ran").touch()\n'
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    (tmp_path / "model.toml").write_text(THREE_CHANNEL_MODEL)
-    (tmp_path / "own.py").write_text(MARK)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def refusal(words, capsys):
-    assert main(words) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    return said
+def folder(workplace):
+    (workplace / "model.toml").write_text(THREE_CHANNEL_MODEL)
+    (workplace / "own.py").write_text(MARK)
+    return workplace
 
 
 @pytest.mark.parametrize("form", ["{} = 1", "[{}]", "[[{}]]", "x = {{ {} = 1 }}", " {} =1"])
@@ -58,12 +51,11 @@ def test_a_parquet_file_of_more_rows_than_a_csv_file_may_have_is_refused(tmp_pat
 def test_a_file_of_effects_does_not_run_for_a_table_that_is_refused(command, folder, capsys):
     more = {"pull": ["--load", "60", "--slip-limit", "0.3"], "gap": ["--out", "gap"]}
     words = ["model.toml", "runs.csv", "--effects", "own.py", *more.get(command, [])]
-    assert "no such file" in refusal([command, *words], capsys)
+    refused([command, *words], capsys, "no such file", folder)
     (folder / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.1,60,text\n")
-    refusal([command, *words], capsys)
+    refused([command, *words], capsys, "", folder)
     (folder / "model.toml").write_text("[gear\n")
-    refusal([command, *words], capsys)
-    assert not (folder / "it_ran").exists()
+    refused([command, *words], capsys, "", folder)
 
 
 def test_names_of_outputs_are_printed_without_terminal_commands(folder, capsys):

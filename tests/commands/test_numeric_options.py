@@ -20,10 +20,7 @@ OF_TEXT = {
         "--radius",
         "--width",
         "--torque-noise",
-        "--mass",
-        "--wheelbase",
-        "--track",
-        "--height",
+        *("--mass", "--wheelbase", "--track", "--height"),
     ],
     "simulate": ["--slip", "--load"],
     "plan next": ["--slip", "--load", "--gravity", "--tested-at", "--radius"],
@@ -99,8 +96,7 @@ def run(words, folder, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(
-    ("command", "option"),
-    [*CHEAP, *(pytest.param(*one, marks=pytest.mark.slow) for one in LONG)],
+    ("command", "option"), [*CHEAP, *(pytest.param(*one, marks=pytest.mark.slow) for one in LONG)]
 )
 def test_a_command_answers_or_refuses_whatever_number_it_is_given(
     command, option, folder, monkeypatch, capsys

@@ -1,11 +1,9 @@
 """`soilml pull`: from a table of rows to a band of pull and a slope."""
 
-import csv
-import io
-
 import numpy as np
 import pytest
 from conftest import MODEL
+from console import refused, rows_of
 
 from soilml import Operating, read_case
 from soilml.cli import main
@@ -18,12 +16,11 @@ COMMAND = ["pull", "model.toml", "runs.csv", "--load", "60", "--slip-limit", "0.
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(workplace):
     """A model file, and two rows without noise on a soil of its prior."""
-    (tmp_path / "model.toml").write_text(MODEL)
-    (tmp_path / "runs.csv").write_text(ROWS.format(*torque(tmp_path)))
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+    (workplace / "model.toml").write_text(MODEL)
+    (workplace / "runs.csv").write_text(ROWS.format(*torque(workplace)))
+    return workplace
 
 
 def truth(folder, slip):
@@ -34,10 +31,6 @@ def truth(folder, slip):
 
 def torque(folder):
     return truth(folder, np.asarray([0.2, 0.4])).torque.round(3)
-
-
-def rows_of(text):
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def test_curves_picture_and_words_agree_and_hold_the_truth(folder, capsys):
@@ -76,9 +69,7 @@ def test_a_trained_file_may_say_what_the_soil_is(folder, small_model, capsys):
     assert low < truth(folder, 0.4).drawbar_pull < high
     other = MODEL.replace("radius = 0.15", "radius = 0.2")
     (folder / "model.toml").write_text(other)
-    capsys.readouterr()
-    assert main([*COMMAND, "--from", str(small_model)]) == 2
-    assert "was trained with gear.radius 0.15" in capsys.readouterr().err
+    refused([*COMMAND, "--from", small_model], capsys, "was trained with gear.radius 0.15")
     (folder / "model.toml").write_text(MODEL.replace("[soil.prior]", "n = 0.9\n[soil.prior]"))
     assert main([*COMMAND, "--from", str(small_model), "--out", "pull.csv"]) == 0
     assert "was trained with n 1.1, the model file has 0.9" in capsys.readouterr().out

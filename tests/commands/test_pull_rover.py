@@ -1,8 +1,7 @@
 """`soilml pull` of a whole rover: text, files, options that belong together."""
 
-import csv
-
 import pytest
+from console import refused, rows_of
 
 from soilml.cli import main
 
@@ -34,12 +33,12 @@ def test_a_rover_is_answered_for_as_a_whole(files, tmp_path, capsys):
     assert main(["pull", *files, "--slope", "0,8", "--gravity", "moon", *outputs, "-v"]) == 0
     said = capsys.readouterr().out
     assert said.startswith("The rover climbs ") and "rear-left" in said
-    rows = list(csv.DictReader(out.read_text().splitlines()))
+    rows = rows_of(out.read_text())
     assert [round(float(row["slope_rad"]), 3) for row in rows] == [0.0, 0.14]
     assert float(rows[1]["slip"]) > float(rows[0]["slip"])
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_slope_that_no_rover_stands_on_is_refused(files, capsys):
-    assert main(["pull", *files, "--slope", "58"]) == 2
-    assert "leaves the ground on a slope of 58 deg" in capsys.readouterr().err
+    words = ["pull", *files, "--slope", "58"]
+    refused(words, capsys, "leaves the ground on a slope of 58 deg")

@@ -1,6 +1,5 @@
 """Reports: a page and a JSON file with the same numbers, written with the other outputs as one."""
 
-import csv
 import hashlib
 import json
 from html.parser import HTMLParser
@@ -9,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import MODEL
+from console import rows_of
 
 from soilml.cli import main
 from soilml.report.numbers import pretty
@@ -43,27 +43,16 @@ class Seen(HTMLParser):
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    (tmp_path / "model.toml").write_text(MODEL)
-    (tmp_path / "runs.csv").write_text(RUNS)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+def folder(workplace):
+    (workplace / "model.toml").write_text(MODEL)
+    (workplace / "runs.csv").write_text(RUNS)
+    return workplace
 
 
 COMMANDS = {
     "identify": ["identify", "model.toml", "runs.csv", "--by", "run"],
     "estimate": ["estimate", str(ROOT / "exported/wheel_linear.onnx"), "runs.csv", "--by", "run"],
-    "pull": [
-        "pull",
-        "model.toml",
-        "runs.csv",
-        "--load",
-        "60",
-        "--slip-limit",
-        "0.4",
-        "--by",
-        "run",
-    ],
+    "pull": ["pull", "model.toml", "runs.csv", *("--load=60", "--slip-limit=0.4", "--by=run")],
 }
 
 
@@ -96,7 +85,7 @@ def test_a_report_is_a_page_and_a_file_with_what_was_asked_and_found(folder, kin
 @pytest.mark.slow
 def test_the_file_of_a_report_has_the_numbers_of_the_table(folder, capsys):
     assert main([*COMMANDS["estimate"], "--report", "found", "--out", "all.csv"]) == 0
-    rows = list(csv.DictReader((folder / "all.csv").read_text().splitlines()))
+    rows = rows_of((folder / "all.csv").read_text())
     columns = json.loads((folder / "found/report.json").read_text())["columns"]
     assert list(columns) == list(rows[0])
     for name in ("cohesion_Pa", "friction_angle_rad_std", "shear_modulus_m_p95"):

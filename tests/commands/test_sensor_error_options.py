@@ -5,15 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import MODEL, simulated_run
+from console import rows_printed
 
-from soilml.cli import main
 from soilml.config.case import read_case_of_one_gear
-from soilml.config.measurement_noise import (
-    common_errors,
-)
+from soilml.config.measurement_noise import common_errors
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.identification.trained_estimator import with_sensors_of
+from soilml.io.text_tables import csv_text
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import COMMON_ERROR_INPUTS
 
@@ -21,29 +20,23 @@ BIAS = '[bias]\nslip = 0.0\nload_N = "0 %"\ntorque_Nm = "5 % + 0.1"\nsinkage_m =
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "exact.toml").write_text(MODEL)
-    (tmp_path / "noisy.toml").write_text(MODEL + 'slip = 0.02\nload_N = "2 %"\n')
-    (tmp_path / "biased.toml").write_text(MODEL + BIAS)
-    return tmp_path
+def folder(workplace):
+    (workplace / "exact.toml").write_text(MODEL)
+    (workplace / "noisy.toml").write_text(MODEL + 'slip = 0.02\nload_N = "2 %"\n')
+    (workplace / "biased.toml").write_text(MODEL + BIAS)
+    return workplace
 
 
 def write_runs(path: Path, run: dict[str, np.ndarray], **columns: float) -> None:
     table = {"slip": run["slip"], "load_N": run["load"], "torque_Nm": run["torque"]}
     table |= {key: np.full(len(run["slip"]), value) for key, value in columns.items()}
-    lines = ["run," + ",".join(table)]
-    lines += [
-        ",".join(["a", *(f"{v:.9g}" for v in row)]) for row in zip(*table.values(), strict=True)
-    ]
-    path.write_text("\n".join(lines) + "\n")
+    path.write_text(csv_text({"run": ["a"] * len(run["slip"]), **table}))
 
 
 def widths(capsys, *arguments: str) -> np.ndarray:
     """Standard deviations of the single line of `estimate --by run`."""
-    assert main(["estimate", *arguments, "--by", "run", "--format", "csv"]) == 0
-    head, row = (line.split(",") for line in capsys.readouterr().out.splitlines()[:2])
-    return np.asarray([float(v) for k, v in zip(head, row, strict=True) if k.endswith("_std")])
+    (row,) = rows_printed(["estimate", *arguments, "--by", "run"], capsys)
+    return np.asarray([float(v) for k, v in row.items() if k.endswith("_std")])
 
 
 def test_columns_and_noise_of_slip_and_load_widen_the_estimate(

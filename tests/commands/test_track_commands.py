@@ -1,11 +1,10 @@
 """A tracked robot from the shell: how it stands in the soil, and its soil as a mean of groups."""
 
-import csv
-import io
 import json
 
 import numpy as np
 import pytest
+from console import rows_printed
 
 from soilml import read_case, simulate
 from soilml.cli import main
@@ -24,56 +23,41 @@ shear_modulus = [0.01, 0.08]
 [noise]
 drawbar_pull_N = "3 % + 5"
 """
+WORDS = ("status", "traffic_class")  # columns of words
 SIMULATE = ["simulate", "m.toml", "--slip", "0.02,0.1,0.3", "--load", "638", "--balance"]
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    (tmp_path / "m.toml").write_text(MODEL)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def columns_of(text):
-    rows = list(csv.DictReader(io.StringIO(text)))
-    return {name: [row[name] for row in rows] for name in rows[0]}
-
-
-def numbers(column):
-    return np.asarray([float(cell) for cell in column])
+def folder(workplace):
+    (workplace / "m.toml").write_text(MODEL)
+    return workplace
 
 
 def test_the_shares_carry_the_load(folder, capsys):
-    assert main([*SIMULATE, "--efficiency", "--picture", "t.png", "--format", "csv"]) == 0
-    level = columns_of(capsys.readouterr().out)
-    parts = [numbers(level[f"{part}_share"]) for part in ("front", "belt", "rear")]
+    rows = rows_printed([*SIMULATE, "--efficiency", "--picture", "t.png"], capsys)
+    cells = {name: [row[name] for row in rows] for name in rows[0] if name not in WORDS}
+    level = {name: np.asarray(own, float) for name, own in cells.items()}
+    parts = [level[f"{part}_share"] for part in ("front", "belt", "rear")]
     np.testing.assert_allclose(sum(parts), 1.0, atol=1e-9)
-    rear = numbers(level["rear_sinkage_m"])
-    np.testing.assert_allclose(rear, 1.2 * numbers(level["sinkage_m"]))  # R_1f of the default
+    rear = level["rear_sinkage_m"]
+    np.testing.assert_allclose(rear, 1.2 * level["sinkage_m"])  # R_1f of the default
     assert (np.diff(rear) < 0.0).all()
-    pull = numbers(level["drawbar_pull_N"])
-    ratio = (1.0 - numbers(level["slip"])) * 0.1 * pull / numbers(level["torque_Nm"])
-    np.testing.assert_allclose(numbers(level["tractive_efficiency"]), ratio)
+    ratio = (1.0 - level["slip"]) * 0.1 * level["drawbar_pull_N"] / level["torque_Nm"]
+    np.testing.assert_allclose(level["tractive_efficiency"], ratio)
     assert (folder / "t.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.fixture
-def groups(folder):
-    """Four groups of eight pulls."""
-    case, slips = read_case("m.toml"), np.linspace(0.05, 0.85, 8)
-    for name, seeds, slip in (("runs.csv", range(4), slips),):
-        text = "run,slip,load_N,drawbar_pull_N\n"
-        for seed in seeds:
-            pull = simulate(case, slip, 638.0, seed=seed)["drawbar_pull_N"]
-            text += "".join(f"g{seed},{s},638,{p}\n" for s, p in zip(slip, pull, strict=True))
-        (folder / name).write_text(text)
 
 
 MEAN = ["identify", "m.toml", "runs.csv", "--method", "nonlinear", "--by", "run", "--mean"]
 
 
 @pytest.mark.slow
-def test_the_mean_of_groups(groups, folder, capsys):
+def test_the_mean_of_groups(folder, capsys):
+    case, slip = read_case("m.toml"), np.linspace(0.05, 0.85, 8)
+    text = "run,slip,load_N,drawbar_pull_N\n"
+    for seed in range(4):
+        pull = simulate(case, slip, 638.0, seed=seed)["drawbar_pull_N"]
+        text += "".join(f"g{seed},{s},638,{p}\n" for s, p in zip(slip, pull, strict=True))
+    (folder / "runs.csv").write_text(text)
     assert main([*MEAN, "--report", "found"]) == 0
     said = capsys.readouterr().out
     content = json.loads((folder / "found" / "report.json").read_text())

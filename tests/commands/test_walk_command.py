@@ -1,25 +1,16 @@
 """`soilml walk`: wheel-legs on soft ground, as tables and pictures."""
 
-import csv
-import io
-
 import numpy as np
 import pytest
-
-from soilml.cli import main
+from console import refused, rows_printed
 
 SOFT, FIRM = "0.4e6", "1e6"
-
-
-def rows_of(text):
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def test_a_row_for_each_combination_and_firm_ground_carries_better(tmp_path, capsys):
     picture = tmp_path / "feet.png"
     command = ["paper", "walk", "--foot", "LTF,CIF", "--stiffness", f"{SOFT},0.7e6,{FIRM}"]
-    assert main([*command, "--picture", str(picture), "--format", "csv"]) == 0
-    found = rows_of(capsys.readouterr().out)
+    found = rows_printed([*command, "--picture", picture], capsys)
     assert [(row["foot"], float(row["stiffness_N_m3"])) for row in found] == [
         (foot, stiffness) for foot in ("LTF", "CIF") for stiffness in (4e5, 7e5, 1e6)
     ]
@@ -46,7 +37,5 @@ def test_a_row_for_each_combination_and_firm_ground_carries_better(tmp_path, cap
     ],
 )
 def test_bad_requests_are_refused_in_one_line(options, expected, tmp_path, capsys):
-    out, picture = tmp_path / "walks.csv", tmp_path / "walks.png"
-    assert main(["paper", "walk", *options, "--out", str(out), "--picture", str(picture)]) == 2
-    assert expected in capsys.readouterr().err.strip().splitlines()[-1]
-    assert not out.exists() and not picture.exists()
+    files = ["--out", tmp_path / "walks.csv", "--picture", tmp_path / "walks.png"]
+    refused(["paper", "walk", *options, *files], capsys, expected, tmp_path)

@@ -1,19 +1,12 @@
 """`soilml wheel-leg`: from strides to the soil by each sensor, and fused."""
 
-import csv
-import io
-
 import numpy as np
 import pytest
+from console import refused, rows_printed
 
-from soilml.cli import main
 from soilml.systems.wheel_legs.stride_relations import TORQUE_SLIP, VIBRATION_SLIP, soil_of_sinkage
 
 HEAD = "run,slip,torque_Nm,vibration_m_s2,sinkage_m\n"
-
-
-def rows_of(text):
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 @pytest.fixture
@@ -29,8 +22,7 @@ def strides(tmp_path):
 
 def test_each_sensor_and_the_fused_soil(strides, capsys):
     command = ["paper", "wheel-leg", str(strides), "--by", "run", "--torque-model", "empirical"]
-    assert main([*command, "--format", "csv"]) == 0
-    found = {(row["run"], row["sensor"]): row for row in rows_of(capsys.readouterr().out)}
+    found = {(row["run"], row["sensor"]): row for row in rows_printed(command, capsys)}
     assert set(found) == {("a", "torque"), ("a", "sinkage"), ("a", "fused"), ("b", "sinkage")}
     torque, sinkage, fused = (found["a", name] for name in ("torque", "sinkage", "fused"))
     assert float(torque["friction_angle_rad"]) == pytest.approx(np.deg2rad(40.0), abs=1e-6)
@@ -55,9 +47,8 @@ def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
     file, picture = tmp_path / "strides.csv", tmp_path / "slip.png"
     file.write_text(HEAD + "".join(lines) + f"b,,,{(0.4 - c) / d},\n")
     command = ["paper", "wheel-leg", str(file), "--torque-model", "empirical"]
-    command += ["--vibration-model", "planar", "--format", "csv"]
-    assert main([*command, "--known", "ssc-2", "--picture", str(picture)]) == 0
-    found = rows_of(capsys.readouterr().out)
+    command += ["--vibration-model", "planar", "--known"]
+    found = rows_printed([*command, "ssc-2", "--picture", picture], capsys)
     for row, slip in zip(found, (0.1, 0.3, 0.4), strict=True):
         for name in ("slip_by_torque", "slip_by_vibration", "slip"):
             assert row[name] == "" or float(row[name]) == pytest.approx(slip, abs=2e-4)
@@ -65,8 +56,7 @@ def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
     assert float(found[0]["slip_std"]) == pytest.approx((1 / 0.005 + 1 / 0.015) ** -0.5)  # eq. 26
     assert float(found[2]["slip_std"]) == pytest.approx(0.015**0.5)
     assert picture.read_bytes().startswith(b"\x89PNG")
-    assert main([*command, "--known", "42.77,23600"]) == 0
-    again = rows_of(capsys.readouterr().out)
+    again = rows_printed([*command, "42.77,23600"], capsys)
     assert float(again[1]["slip"]) == pytest.approx(float(found[1]["slip"]), abs=1e-3)
 
 
@@ -88,8 +78,5 @@ def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
 def test_bad_strides_are_refused_in_one_line(text, options, expected, tmp_path, capsys):
     file = tmp_path / "strides.csv"
     file.write_text(text)
-    out = tmp_path / "soil.csv"
-    assert main(["paper", "wheel-leg", str(file), *options, "--out", str(out)]) == 2
-    said = capsys.readouterr().err.strip().splitlines()
-    assert expected in said[-1]
-    assert not out.exists()
+    words = ["paper", "wheel-leg", file, *options, "--out", tmp_path / "soil.csv"]
+    refused(words, capsys, expected, tmp_path)

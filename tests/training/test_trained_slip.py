@@ -1,18 +1,18 @@
 """Slip as what is learned: from torque, from other channels, and from both in one file or two."""
 
+import functools
+
 import numpy as np
 import pytest
 from conftest import WHEEL_ON_SAND
+from trained_by_text import trained_by
 
 from datagen.generate import generate
 from datagen.recipe import read_recipe
 from soilml import Estimator
 from soilml.cli import main
 from soilml.errors import InputError
-from training.dataset import read_dataset
 from training.export.model_file import export_model
-from training.spec import read_spec
-from training.train import train
 
 pytestmark = pytest.mark.slow
 
@@ -51,19 +51,13 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def trained(folder):
-    made = {}
-
+    @functools.cache
     def of(text, data="known"):
-        if (text, data) not in made:
-            (folder / "s.toml").write_text(text)
-            spec = read_spec(folder / "s.toml")
-            original = train(
-                spec, read_dataset(folder / f"{data}.parquet", spec.features, ("slip",))
-            )
-            path = folder / f"{len(made)}.onnx"
-            export_model(original, path, folder / f"{data}.parquet")
-            made[text, data] = original, path
-        return made[text, data]
+        rows = folder / f"{data}.parquet"
+        original = trained_by(text, rows, folder)
+        path = folder / f"{len(list(folder.iterdir()))}.onnx"
+        export_model(original, path, rows)
+        return original, path
 
     return of
 

@@ -3,8 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
+from conftest import RECIPE
 
+from datagen.generate import generate
+from datagen.recipe import read_recipe
+from soilml import Estimator, read_table
 from soilml.errors import InputError, TableError
 from training.dataset import read_dataset
 from training.regressors.linear_gaussian import LinearGaussian
@@ -20,7 +25,6 @@ def data(small_data):
     return read_dataset(small_data, FEATURES, TARGETS)
 
 
-@pytest.mark.slow
 def test_every_row_trains_and_is_estimated_by_a_fit_that_has_not_seen_its_run(data):
     """Estimates of rows left out are as good as those of rows of another seed, and no better."""
     spec = read_spec("linear")
@@ -47,12 +51,6 @@ def test_train_writes_the_model_card(small_model):
 
 
 def test_the_exported_intervals_hold_on_data_of_another_seed(small_model, tmp_path):
-    from conftest import RECIPE
-
-    from datagen.generate import generate
-    from datagen.recipe import read_recipe
-    from soilml import Estimator, read_table
-
     (tmp_path / "r.toml").write_text(RECIPE.format(rows=4000, seed=77))
     generate(read_recipe(tmp_path / "r.toml"), tmp_path / "t.parquet")
     table = read_table(tmp_path / "t.parquet")
@@ -92,8 +90,6 @@ def test_invalid_entries_of_a_spec_are_named(tmp_path, text, message):
 def test_data_without_targets_or_with_too_few_rows_is_refused(tmp_path, small_data):
     with pytest.raises(TableError, match="kphi_SI is missing"):
         read_dataset(small_data, FEATURES, ("kphi",))
-    import pyarrow.parquet as pq
-
     few = pq.read_table(small_data).slice(0, 11)
     pq.write_table(few, tmp_path / "few.parquet")
     with pytest.raises(TableError, match="11 usable rows; needed are 12"):

@@ -11,9 +11,8 @@ from soilml.numerics.prior import Prior
 
 
 def written(tmp_path, text):
-    path = tmp_path / "model.toml"
-    path.write_text(text)
-    return path
+    (tmp_path / "model.toml").write_text(text)
+    return tmp_path / "model.toml"
 
 
 def test_reads_everything_a_model_file_may_hold(tmp_path):
@@ -103,6 +102,7 @@ def test_lengths_that_differ_between_channels_cannot_be_written(tmp_path):
         case_as_toml(case)
 
 
+EXITS = '[[effect]]\nname = "exit-angle"\n'
 MISTAKES = {
     "no such type": ('type = "wheel"', 'type = "wheels"', "wheel, linear-wheel"),
     "missing width": ("width = 0.12", "", "width is missing"),
@@ -116,8 +116,8 @@ MISTAKES = {
     "unknown soil": ("wong1989/dry_sand", "wong1989/dry_sands", "soilml show soils"),
     "unknown prior": ("cohesion = [", "cohesoin = [", "did you mean 'cohesion'"),
     "normal prior of a positive value": (
-        "cohesion = [0.0, 3000.0]",
-        "cohesion = { normal = 500.0 }",
+        "[0.0, 3000.0]",
+        "{ normal = 500.0 }",
         "half-normal = 500",
     ),
     "normal prior without width": ("[0.0, 3000.0]", "{ normal = 0.0 }", "above zero"),
@@ -128,43 +128,20 @@ MISTAKES = {
     "noise in words": ('"2 %"', '"two percent"', "2 %"),
     "unknown table": ("[noise]", "[noises]\n[noise]", "did you mean 'noise'"),
     "negative noise": ('"2 %"', '"-2 %"', "zero or more"),
-    "discrepancy of a column that no model predicts": (
-        "[noise]",
-        '[discrepancy]\nslip = "2 %"\n[noise]',
-        "unknown key 'slip'",
-    ),
-    "discrepancy without unit": (
-        "[noise]",
-        '[discrepancy]\ntorque = "2 %"\n[noise]',
-        "did you mean 'torque_Nm'",
-    ),
-    "discrepancy in words": (
-        "[noise]",
-        '[discrepancy]\ntorque_Nm = "small"\n[noise]',
-        "'2 %' of the readings' range",
-    ),
-    "negative discrepancy": ("[noise]", "[discrepancy]\ntorque_Nm = -1\n[noise]", "zero or more"),
-    "discrepancy of no channel": (
-        "[noise]",
-        "[discrepancy]\nslip_length = 0.2\n[noise]",
-        "no channel has a discrepancy",
-    ),
-    "length of zero": (
-        "[noise]",
-        "[discrepancy]\ntorque_Nm = 1.0\nslip_length = 0\n[noise]",
-        "slip_length is 0; a correlation length must be above zero",
-    ),
+    **{
+        f"[discrepancy] {line}": ("[noise]", f"[discrepancy]\n{line}\n[noise]", said)
+        for line, said in {
+            'slip = "2 %"': "unknown key 'slip'",
+            'torque = "2 %"': "did you mean 'torque_Nm'",
+            'torque_Nm = "small"': "'2 %' of the readings' range",
+            "torque_Nm = -1": "zero or more",
+            "slip_length = 0.2": "no channel has a discrepancy",
+            "torque_Nm = 1.0\nslip_length = 0": "slip_length is 0; a correlation length must",
+        }.items()
+    },
     "no TOML": ("[gear]", "[gear", "not valid TOML"),
-    "unknown effect": (
-        "[noise]",
-        '[[effect]]\nname = "sinking"\n[noise]',
-        "slip-sinkage, grousers",
-    ),
-    "effect twice": (
-        "[noise]",
-        '[[effect]]\nname = "exit-angle"\n[[effect]]\nname = "exit-angle"\n[noise]',
-        "already",
-    ),
+    "unknown effect": ("[noise]", f"{EXITS.replace('exit-angle', 'sinking')}[noise]", "grousers"),
+    "effect twice": ("[noise]", f"{EXITS}{EXITS}[noise]", "already"),
 }
 
 

@@ -37,16 +37,14 @@ def part(column="torque_Nm", gear="", **changed):
 
 
 @pytest.fixture
-def case(tmp_path):
-    (tmp_path / "plain.toml").write_text(MODEL)
-    return replace(read_case(tmp_path / "plain.toml"), remainder=Remainder((part(),)))
+def case(model_file):
+    return replace(read_case(model_file), remainder=Remainder((part(),)))
 
 
 def test_it_is_written_and_read_to_the_last_digit(case, tmp_path):
     again = tmp_path / "model.toml"
     again.write_text(case_as_toml(case))
-    assert read_case(again) == case
-    assert read_case(again).remainder == case.remainder
+    assert read_case(again) == case and read_case(again).remainder == case.remainder
 
 
 def test_mean_and_variance_are_those_of_the_conditional_process():
@@ -175,21 +173,20 @@ def test_a_damaged_section_is_refused_in_one_line(case, tmp_path, what, capsys):
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
 
 
-def test_an_empty_section_is_refused(tmp_path):
-    (tmp_path / "wrong.toml").write_text(MODEL + "[remainder]\nformat = 1\n")
+def test_an_empty_section_is_refused(model_file):
+    model_file.write_text(MODEL + "[remainder]\nformat = 1\n")
     with pytest.raises(InputError, match="needed are 1 to"):
-        read_case(tmp_path / "wrong.toml")
+        read_case(model_file)
 
 
-def test_the_command_writes_the_error_where_it_is_asked_for(case, tmp_path, capsys):
-    (tmp_path / "model.toml").write_text(case_as_toml(case))
-    command = ["simulate", str(tmp_path / "model.toml"), "--slip", "0.1,0.3", "--load", "60"]
+def test_the_command_writes_the_error_where_it_is_asked_for(case, model_file, tmp_path, capsys):
+    (tmp_path / "learned.toml").write_text(case_as_toml(case))
+    command = ["simulate", str(tmp_path / "learned.toml"), "--slip", "0.1,0.3", "--load", "60"]
     assert main(command) == 0
     assert "+-" not in capsys.readouterr().out
     assert main([*command, "--std"]) == 0
     assert "+-" in capsys.readouterr().out
-    plain = [command[0], str(tmp_path / "plain.toml"), *command[2:], "--std"]
-    assert main(plain) == 2
+    assert main([command[0], str(model_file), *command[2:], "--std"]) == 2
     assert "has no [remainder]" in capsys.readouterr().err
 
 

@@ -40,10 +40,13 @@ torque_Nm = "2 %"
 """
 
 
-def case_of(tmp_path, text):
+UNNAMED = '[gear]\ntype = "wheel"\nradius = 0.2\nwidth = 0.1\n'
+
+
+def case_of(tmp_path, text, **options):
     path = tmp_path / "model.toml"
     path.write_text(text)
-    return read_case(path)
+    return read_case(path, **options)
 
 
 def test_each_gear_has_its_dimensions_and_effects_and_shares_the_rest(tmp_path):
@@ -74,17 +77,14 @@ friction_angle = 0.5
 [[explanation.effect]]
 name = "bulldozing"
 """
-    path = tmp_path / "mixed.toml"
-    path.write_text(GEARS + REST + several)
     with pytest.raises(InputError, match=r"has 2 explanations .* keep one"):
-        read_case(path)
-    case = read_case(path, with_explanations=True)
+        case_of(tmp_path, GEARS + REST + several)
+    case = case_of(tmp_path, GEARS + REST + several, with_explanations=True)
     first, second = (case.of_explanation(one) for one in case.explanations)
     assert first.gears["lugged"].effects[0].height == 0.008
     assert first.prior["grousers@lugged.height"] == Prior(0.004, 0.012)
     assert [e.name for e in second.model.effects] == ["slip-sinkage", "bulldozing"]
-    path.write_text(case_as_toml(case))
-    assert read_case(path, with_explanations=True) == case
+    assert case_of(tmp_path, case_as_toml(case), with_explanations=True) == case
     at = Operating(slip=np.asarray([0.1, 0.4]), load=60.0)
     pull = [
         np.asarray(forces(one.of_gear("lugged"), at).drawbar_pull) for one in (case, first, second)
@@ -92,18 +92,15 @@ name = "bulldozing"
     np.testing.assert_allclose(pull[0], (0.6 * pull[1] + 0.3 * pull[2]) / 0.9, rtol=1e-12)
     assert case.without_explanations().gears == case.gears
     for wrong in ("weight = 0.9", "weight = 1.5"):
-        path.write_text(GEARS + REST + several.replace("weight = 0.6", wrong))
         with pytest.raises(InputError, match="weight"):
-            read_case(path)
+            case_of(tmp_path, GEARS + REST + several.replace("weight = 0.6", wrong))
 
 
 def test_a_suspected_effect_of_an_earlier_file_is_its_only_explanation(tmp_path):
     marked = (GEARS + REST).replace("n1 = 0.3", "suspected = true\nn1 = 0.3")
-    path = tmp_path / "old.toml"
-    path.write_text(marked)
-    case = read_case(path, with_explanations=True)
+    case = case_of(tmp_path, marked, with_explanations=True)
     assert case.model.effects == () and [e.weight for e in case.explanations] == [1.0]
-    assert [e.name for e in read_case(path).model.effects] == ["slip-sinkage"]
+    assert [e.name for e in case_of(tmp_path, marked).model.effects] == ["slip-sinkage"]
 
 
 def test_parameters_of_gears_are_set_by_path(tmp_path):
@@ -128,7 +125,7 @@ def test_a_gears_own_effect_replaces_the_shared_one(tmp_path):
     assert "grousers.height" not in case.paths_of_gear("lugged")
 
 
-@pytest.mark.parametrize("unnamed", ["", '[gear]\ntype = "wheel"\nradius = 0.2\nwidth = 0.1\n'])
+@pytest.mark.parametrize("unnamed", ["", UNNAMED])
 def test_a_written_case_is_read_back(tmp_path, unnamed):
     case = case_of(tmp_path, unnamed + GEARS + REST)
     again = case_of(tmp_path, case_as_toml(case, ["a comment"]))
@@ -137,9 +134,8 @@ def test_a_written_case_is_read_back(tmp_path, unnamed):
 
 
 def test_an_unnamed_gear_can_have_effects_of_its_own_beside_named_ones(tmp_path):
-    unnamed = '[gear]\ntype = "wheel"\nradius = 0.2\nwidth = 0.1\n'
     own = '[[gear.effect]]\nname = "wheel-flexibility"\ncompliance = 1e-5\n'
-    case = case_of(tmp_path, unnamed + own + GEARS + REST)
+    case = case_of(tmp_path, UNNAMED + own + GEARS + REST)
     assert case.parameters()["wheel-flexibility@gear.compliance"][1] == 1e-5
     assert case.parameters()["gear.radius"][1] == 0.2
     assert case_of(tmp_path, case_as_toml(case)) == case
@@ -148,11 +144,7 @@ def test_an_unnamed_gear_can_have_effects_of_its_own_beside_named_ones(tmp_path)
 MISTAKES = {
     "unknown effect": ("grousers", "lugs", "there are: slip-sinkage, grousers"),
     "wrong name": ("gears.smooth", 'gears."a b"', "letters, digits"),
-    "name of the unnamed gear": (
-        "[gears.smooth]",
-        '[gear]\ntype = "wheel"\nradius = 0.1\nwidth = 0.1\n[gears.gear]',
-        "take another",
-    ),
+    "name of the unnamed gear": ("[gears.smooth]", f"{UNNAMED}[gears.gear]", "take another"),
     "missing width": ("width = 0.12\n", "", r"\[gears.smooth\]: width is missing"),
     "unknown key": ("width = 0.12\n", "width = 0.12\nlugs = 3\n", "unknown key 'lugs'"),
     "effect of a track for all": (

@@ -33,6 +33,7 @@ sinkage_m = "2 %"
 )
 SIMULATOR = '[simulator]\ntable = "simulated.csv"\nslip = [0.05, 0.6]\nload_N = [30.0, 110.0]\n'
 TRUTH = {"cohesion": 1300.0, "friction_angle": 0.55, "shear_modulus": 0.016}
+INPUTS = ("slip", "load_N", "cohesion_Pa", "friction_angle_rad", "shear_modulus_m")
 #: A simulator as users write one: columns in, columns out.
 RIG = """\
 from soilml import Model, Operating, Wheel, soil
@@ -103,29 +104,24 @@ def box(folder):
 
 
 def test_the_error_that_is_stated_is_that_of_runs_that_the_emulator_has_not_seen(box):
-    case = box
-    rng = np.random.default_rng(5)
-    gear = case.model.gear
+    rng, gear = np.random.default_rng(5), box.model.gear
     x = gear.values(rng.random((400, 5)))
-    known = dict(zip(("slip", "load_N", "cohesion_Pa", "friction_angle_rad", "shear_modulus_m"),
-                     x.T, strict=True))  # fmt: skip
     assert gear.inputs == ("slip", "load", "cohesion", "friction_angle", "shear_modulus")
     assert gear.logarithmic == (False, True, False, False, True)
-    truth, found = simulate(known), gear.emulate(gear.fractions(x))
-    for i, (name, stated) in enumerate(case.simulator.error.items()):
+    truth, found = simulate(dict(zip(INPUTS, x.T, strict=True))), gear.emulate(gear.fractions(x))
+    for i, (name, stated) in enumerate(box.simulator.error.items()):
         error = np.sqrt(np.mean((found[:, i] - truth[name]) ** 2))
         # an upper estimate, of three quarters of the runs: 1.5 to 1.7 times the error here
         assert 0.3 * stated < error < 1.3 * stated
         assert stated < 0.03 * np.std(truth[name])
-        assert case.discrepancy[name].constant == stated
+        assert box.discrepancy[name].constant == stated
 
 
 def test_the_intervals_of_an_emulator_hold_the_runs_that_it_has_not_seen(folder, box):
     """The process alone holds 0.53 to 0.86 of them where 0.9 is stated."""
     gear, emulator = emulator_of(read_runs(folder / "simulated.csv"), box.model.gear, box.prior)
     x = gear.values(np.random.default_rng(6).random((400, 5)))
-    columns = ("slip", "load_N", "cohesion_Pa", "friction_angle_rad", "shear_modulus_m")
-    forces = simulate(dict(zip(columns, x.T, strict=True)))
+    forces = simulate(dict(zip(INPUTS, x.T, strict=True)))
     truth = np.stack([forces[column(name)] for name in gear.channels], axis=1)
     u = gear.fractions(x)
     held = np.mean(np.abs(emulator(u) - truth) < 1.645 * emulator.std(u), axis=0)
@@ -150,23 +146,21 @@ def test_the_wheel_as_a_black_box_gives_the_soil_of_the_front_door(folder, box):
 
 
 def test_outside_the_runs_there_is_no_answer(box):
-    case = box
     at = Operating(slip=np.asarray([0.2, 0.2, 0.95]), load=np.asarray([60.0, 200.0, 60.0]))
-    force = case.model(case.soil, at)
+    force = box.model(box.soil, at)
     assert force.status.tolist() == [0, 5, 5] and np.isnan(force.torque[1:]).all()
     with pytest.raises(InputError, match="asks for the contact of its wheel"):
-        case.model.profile(case.soil, Operating(slip=0.2, load=60.0))
+        box.model.profile(box.soil, Operating(slip=0.2, load=60.0))
 
 
 @pytest.mark.parametrize("how", ["python", pytest.param("command", marks=pytest.mark.slow)])
 def test_design_runs_makes_runs_and_more_where_the_emulator_is_unsure(
-    folder, tmp_path, monkeypatch, capsys, how
+    folder, workplace, capsys, how
 ):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "rig.py").write_text(RIG + BY_COMMAND)
+    (workplace / "rig.py").write_text(RIG + BY_COMMAND)
     own = {"python": 'python = "rig.py:forces"', "command": 'command = "PY rig.py {design} {runs}"'}
     text = MODEL + SIMULATOR + own[how].replace("PY", sys.executable) + "\n"
-    (tmp_path / "model.toml").write_text(text)
+    (workplace / "model.toml").write_text(text)
     assert main(["design-runs", "model.toml", "--trust", "--count", "40"]) == 0
     captured = capsys.readouterr()
     assert "40 runs in" in captured.err and "torque_Nm" in captured.out
@@ -188,27 +182,25 @@ def test_design_runs_makes_runs_and_more_where_the_emulator_is_unsure(
     ids=["python", "command"],
 )
 @pytest.mark.parametrize("words", [[], ["--out", "design.csv"]], ids=["printed", "written"])
-def test_a_model_file_runs_no_code_by_itself(tmp_path, monkeypatch, capsys, own, words):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "rig.py").write_text('from pathlib import Path\n\nPath("it_ran").touch()\n' + RIG)
-    (tmp_path / "model.toml").write_text(MODEL + SIMULATOR + own + "\n")
+def test_a_model_file_runs_no_code_by_itself(workplace, capsys, own, words):
+    (workplace / "rig.py").write_text('from pathlib import Path\n\nPath("it_ran").touch()\n' + RIG)
+    (workplace / "model.toml").write_text(MODEL + SIMULATOR + own + "\n")
     assert main(["design-runs", "model.toml", "--count", "40", *words]) == 0
-    assert not {"it_ran", "simulated.csv"} & {file.name for file in tmp_path.iterdir()}
+    assert not {"it_ran", "simulated.csv"} & {file.name for file in workplace.iterdir()}
     said = capsys.readouterr().err
-    assert ("with --trust" in said) == (not words) and ("rig.py:forces" in said or "sh -c" in said
-                                                        or words)  # fmt: skip
+    assert ("with --trust" in said) == (not words)
+    assert words or "rig.py:forces" in said or "sh -c" in said
     main(["design-runs", "model.toml", "--count", "40", "--trust"])
     assert Path("it_ran").exists()
 
 
-def test_trust_needs_code_that_it_trusts(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "model.toml").write_text(MODEL + SIMULATOR)
+def test_trust_needs_code_that_it_trusts(workplace, capsys):
+    (workplace / "model.toml").write_text(MODEL + SIMULATOR)
     assert main(["design-runs", "model.toml", "--trust"]) == 2
     assert "neither python nor command" in capsys.readouterr().err
 
 
-def refused(tmp_path, text="", table=None, **files):
+def refused(tmp_path, text="", table=None):
     """The message of a model with a simulator."""
     (tmp_path / "model.toml").write_text(MODEL + (text or SIMULATOR))
     if table is not None:
@@ -255,14 +247,13 @@ def test_runs_that_cannot_stand_in_for_equations_are_refused(folder, tmp_path):
          "for the same run; fix its seed"),
     ],
 )  # fmt: skip
-def test_simulators_that_fail_are_one_line(tmp_path, monkeypatch, capsys, body, said):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "rig.py").write_text(f"def forces(design):\n    {body}\n")
-    (tmp_path / "model.toml").write_text(MODEL + SIMULATOR + 'python = "rig.py:forces"\n')
+def test_simulators_that_fail_are_one_line(workplace, capsys, body, said):
+    (workplace / "rig.py").write_text(f"def forces(design):\n    {body}\n")
+    (workplace / "model.toml").write_text(MODEL + SIMULATOR + 'python = "rig.py:forces"\n')
     assert main(["design-runs", "model.toml", "--trust", "--count", "40"]) == 2
     captured = capsys.readouterr()
     assert said in captured.err and captured.err.count("\n") == 1
-    assert not (tmp_path / "simulated.csv").exists()
+    assert not (workplace / "simulated.csv").exists()
 
 
 def test_rows_outside_the_runs_are_refused(folder, tmp_path, capsys):

@@ -33,10 +33,9 @@ offset = { normal = "200 mNm" }
 
 
 @pytest.fixture
-def file(tmp_path):
-    path = tmp_path / "model.toml"
-    path.write_text(MODEL)
-    return path
+def file(model_file):
+    model_file.write_text(MODEL)
+    return model_file
 
 
 def test_units_are_converted(file):

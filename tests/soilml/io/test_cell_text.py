@@ -7,12 +7,7 @@ from conftest import MODEL
 
 from soilml.cli import main
 from soilml.errors import TableError
-from soilml.io.cell_text import (
-    escaped,
-    is_plain,
-    read_number,
-    read_whole_number,
-)
+from soilml.io.cell_text import escaped, is_plain, read_number, read_whole_number
 from soilml.io.read_table import read_table
 
 HOSTILE = ["\x1b[2J", "a\x07b", "\x9b31m", "a\u202eb", "a\u200bb", "\u2028"]
@@ -35,13 +30,6 @@ def test_names_with_control_characters_are_refused(name, tmp_path):
     pq.write_table(pa.table(columns), tmp_path / "runs.parquet")
     with pytest.raises(TableError, match=r"line 1, column run: .* control characters"):
         read_table(tmp_path / "runs.parquet")
-
-
-def test_long_names_are_refused(tmp_path):
-    """Every row of a column takes the memory of the longest name."""
-    (tmp_path / "runs.csv").write_text(f"run,slip,load_N\n{'a' * 300},0.1,60\n")
-    with pytest.raises(TableError, match="300 characters"):
-        read_table(tmp_path / "runs.csv")
 
 
 @pytest.mark.parametrize("text", REFUSED)

@@ -12,24 +12,8 @@ pytest.importorskip("pyarrow")
 HEADER = "run,slip,load_N,torque_Nm"
 NUMBERS = st.floats(0.001, 0.9).map(repr) | st.sampled_from(["0.1", ".5", "1e-3", "2.5E-1", "0.30"])
 GOOD = st.sampled_from(["", " 0.25", "0.25 ", "12345678901234567890e-21", "0.1000000000000000055"])
-ODD = st.sampled_from(
-    [
-        "+0.1",
-        "nan",
-        "inf",
-        "1e999",
-        "1_0",
-        "0x1",
-        "1,5",
-        "-",
-        '"0.2"',
-        '"0',
-        " ",
-        "\t",
-        "٣",
-        "0.1d0",
-    ]
-)
+ODD = st.sampled_from(["+0.1", "nan", "inf", "1e999", "1_0", "0x1", "1,5", "-", '"0.2"', '"0', " ",
+                       "\t", "٣", "0.1d0"])  # fmt: skip
 NAMES = st.sampled_from(["a", "b ", " b", "sand 2", "'=1+1", "'=", "é", "run-7", "a" * 40])
 ODD_NAMES = st.sampled_from(["", '"a, b"', 'a"b', "\x1b", "a" * 300, "\x85", "\u2028"])
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pyarrow as pa
 import pytest
+from test_rows_of_analyses import Frame
 
 from soilml import identify, read_case, read_table
 from soilml.errors import TableError
@@ -13,16 +14,6 @@ COLUMNS = {
     "load_N": [40, 80, 40],
     "torque_Nm": [1.513, 4.826, None],
 }
-
-
-class Frame:
-    """Any library's data frame: it has nothing but the Arrow stream."""
-
-    def __init__(self, columns):
-        self.table = pa.table(columns)
-
-    def __arrow_c_stream__(self, requested_schema=None):
-        return self.table.__arrow_c_stream__(requested_schema)
 
 
 #: As polars exports text.

@@ -31,32 +31,22 @@ def test_reads_numbers_names_and_blanks(tmp_path):
     assert np.isnan(read_table(written(tmp_path, torque_Nm=nothing))["torque_Nm"]).all()
 
 
+NO_TEXT = pa.StringArray.from_buffers(
+    2, pa.py_buffer(np.asarray([0, 1, 2], np.int32)), pa.py_buffer(b"\xff\xfe")
+)
 FAULTS = {
     "wrong unit": ({"load_kN": [1.0, 1.0]}, "load is read in N"),
     "misspelt column": ({"torqe_Nm": [1.0, 1.0]}, "did you mean 'torque_Nm'"),
     "extra column": ({"weather": ["dry", "wet"]}, "'weather' is not known"),
     "run missing": ({"run": ["a", None]}, "line 2, column run: the cell is blank"),
-    "booleans": (
-        {"torque_Nm": [True, False]},
-        "column torque_Nm: has type bool; needed are numbers",
-    ),
+    "booleans": ({"torque_Nm": [True, False]}, "torque_Nm: has type bool; needed are numbers"),
     "digits in quotes": (
         {"torque_Nm": ["1", "2"]},
-        "column torque_Nm: has type string; needed are numbers",
+        "torque_Nm: has type string; needed are numbers",
     ),
-    "times": (
-        {"torque_Nm": [datetime.datetime(2024, 1, 1)] * 2},
-        "column torque_Nm: has type timestamp",
-    ),
+    "times": ({"torque_Nm": [datetime.datetime(2024, 1, 1)] * 2}, "torque_Nm: has type timestamp"),
     "lists of runs": ({"run": [["a"], ["b"]]}, "column run: has type list"),
-    "bytes that are no text": (
-        {
-            "run": pa.StringArray.from_buffers(
-                2, pa.py_buffer(np.asarray([0, 1, 2], np.int32)), pa.py_buffer(b"\xff\xfe")
-            )
-        },
-        "column run: has text that is not UTF-8",
-    ),
+    "bytes that are no text": ({"run": NO_TEXT}, "column run: has text that is not UTF-8"),
     "infinity": ({"torque_Nm": [np.inf, 1.0]}, "line 1, column torque_Nm: inf given"),
 }
 
@@ -121,9 +111,10 @@ def test_a_name_of_any_bytes_is_read(tmp_path):
 
 def test_a_folder_without_parquet_files_is_no_table(tmp_path):
     (tmp_path / "folder.parquet").mkdir()
-    with pytest.raises(TableError, match="Is a directory"):
-        read_table(tmp_path)
-    with pytest.raises(TableError, match="Is a directory"):
-        read_table(tmp_path / "folder.parquet")
-    with pytest.raises(TableError, match="no such file"):
-        read_table(tmp_path / "none.parquet")
+    for name, said in (
+        ("", "Is a dir"),
+        ("folder.parquet", "Is a dir"),
+        ("none.parquet", "no such"),
+    ):
+        with pytest.raises(TableError, match=said):
+            read_table(tmp_path / name)

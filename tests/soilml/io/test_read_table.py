@@ -33,7 +33,10 @@ def test_a_byte_order_mark_spaces_and_empty_lines_do_no_harm(tmp_path):
 
 
 FAULTS = {
-    "missing column": ("run,slip,load_N\na,0.1,60\n", "torque_Nm is missing"),
+    "missing column": (
+        "run,slip,load_N\na,0.1,60\n",
+        "torque_Nm is missing; needed is a torque, a drawbar",
+    ),
     "missing run": (GOOD.replace("run,", "").replace("a,", "").replace("b,", ""), "run is missing"),
     "misspelt column": (GOOD.replace("torque_Nm", "torqe_Nm"), "did you mean 'torque_Nm'"),
     "wrong case": (GOOD.replace("torque_Nm", "Torque_nm"), "did you mean 'torque_Nm'"),
@@ -56,6 +59,7 @@ FAULTS = {
     "two stray quotes": (GOOD.replace("a,", '"a,').replace("b,", 'b",'), "quotation marks must"),
     "cell of two lines": (GOOD.replace("a,0.2", '"a\nb",0.2'), "a cell has several lines"),
     "endless cell": (GOOD.replace("0.013", "x" * 9000), f"'{'x' * 60}...' is not a number"),
+    "long name": (GOOD.replace("\na,", f"\n{'a' * 300},"), "300 characters"),
     "no rows": (GOOD.splitlines()[0] + "\n", "no row"),
     "empty file": ("", "is empty"),
     "binary": (b"PK\x03\x04\x00\x00", "binary"),
@@ -100,6 +104,12 @@ def test_a_quote_that_is_not_closed_in_a_column_that_is_passed_over_loses_no_row
 
 
 def test_a_wheel_that_spins_on_the_spot_or_is_locked_is_read(tmp_path):
-    file = tmp_path / "runs.csv"
-    file.write_text("run,slip,load_N,torque_Nm\na,1,60,5\na,-1,60,-4\na,0.3,60,3\n")
+    file = written(tmp_path, "run,slip,load_N,torque_Nm\na,1,60,5\na,-1,60,-4\na,0.3,60,3\n")
     assert read_table(file)["slip"].tolist() == [0.9999, -0.9999, 0.3]
+
+
+@pytest.mark.parametrize("other", ["drawbar_pull_N", "sinkage_m"])
+def test_a_table_without_torque_has_none_in_any_row(other, tmp_path):
+    file = written(tmp_path, f"run,slip,load_N,{other}\na,0.1,60,0.5\na,0.2,60,0.7\n")
+    table = read_table(file, RUNS)
+    assert np.isnan(table["torque_Nm"]).all() and table[other][1] == 0.7

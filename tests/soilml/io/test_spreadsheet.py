@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from soilml.errors import InputError, TableError
+from soilml.errors import InputError
 from soilml.io import spreadsheet
 from soilml.io.bounds import SHEET_BYTES, SHEET_CELLS
 from soilml.io.read_table import read_table
@@ -219,8 +219,7 @@ def test_a_damaged_part_is_refused(tmp_path, part):
     file = rewritten(
         save(tmp_path / "runs.xlsx", A=RUNS), part, lambda text: text[: len(text) // 2]
     )
-    with pytest.raises(TableError, match="damaged"):
-        read_table(file)
+    assert "damaged" in refusal(file)
 
 
 def test_an_empty_book_is_refused(tmp_path):

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import onnx
 import pytest
+from bit_flips import flipped
 from signed_files import signed
 
-from soilml import Estimator
+from soilml import Estimator, Model, Operating, Wheel, soil
 from soilml.errors import ModelFileError
 from soilml.onboard.model_file import find_model, released_models
 
@@ -30,6 +31,8 @@ def test_answers_have_names_units_and_shapes(estimator):
     np.testing.assert_allclose(grid.mean[0, 2], one.mean, rtol=1e-6)
     assert tuple(one["cohesion"]) == (one.mean[0], one.std[0])
     assert (one.low < one.mean).all() and (one.mean < one.high).all()
+    # one reading tells some of the soil
+    assert one.abstains.any() and (one.abstains == (one.std > 0.8 * one.prior_std)).all()
 
 
 def test_readings_out_of_range_are_flagged_and_get_the_prior(estimator):
@@ -46,13 +49,12 @@ def test_readings_out_of_range_are_flagged_and_get_the_prior(estimator):
         assert not bool(wild.in_range)
         np.testing.assert_allclose(wild.std, estimator.prior.std, rtol=1e-6)
         np.testing.assert_allclose(wild.mean, estimator.prior.mean, rtol=1e-6)
+        assert wild.abstains.all()
 
 
 def test_several_rows_of_one_soil_reduce_the_uncertainty(estimator):
     rng = np.random.default_rng(0)
     slip, load = rng.uniform(0.1, 0.55, 12), rng.uniform(35.0, 110.0, 12)
-    from soilml import Model, Operating, Wheel, soil
-
     sand = soil("wong1989/dry_sand", cohesion=900.0, friction_angle=0.6, shear_modulus=0.012)
     force = Model(Wheel(radius=0.15, width=0.12))(sand, Operating(slip=slip, load=load))
     together = estimator.run(slip=slip, torque=force.torque, load=load)
@@ -89,39 +91,21 @@ def test_files_of_another_origin_are_refused(tmp_path, small_model):
         with pytest.raises(ModelFileError) as caught:
             Estimator.load(tmp_path / name)
         assert name in str(caught.value) and "\n" not in str(caught.value)
-    helper = onnx.helper
-    value = helper.make_tensor_value_info("x", 1, ["n"])
-    graph = helper.make_graph(
-        [helper.make_node("Identity", ["x"], ["y"])],
-        "foreign",
-        [value],
-        [helper.make_tensor_value_info("y", 1, ["n"])],
-    )
-    foreign = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)])
-    foreign.ir_version = 9
+    foreign = onnx.load(small_model)
+    del foreign.metadata_props[:]
     onnx.save(foreign, tmp_path / "foreign.onnx")
     with pytest.raises(ModelFileError, match="without soilml metadata"):
         Estimator.load(tmp_path / "foreign.onnx")
 
 
-@pytest.mark.slow
 def test_every_single_damaged_byte_is_found(tmp_path, small_model):
     whole = small_model.read_bytes()
     rng = np.random.default_rng(0)
-    for place in rng.integers(0, len(whole), 60):
-        damaged = bytearray(whole)
-        damaged[place] ^= 1 << int(rng.integers(8))
-        (tmp_path / "damaged.onnx").write_bytes(bytes(damaged))
+    for _ in range(60):
+        (tmp_path / "damaged.onnx").write_bytes(flipped(whole, rng))
         with pytest.raises(ModelFileError) as caught:
             Estimator.load(tmp_path / "damaged.onnx")
         assert "\n" not in str(caught.value)
-
-
-def test_estimates_close_to_the_prior_abstain(estimator):
-    near = estimator(slip=0.3, torque=3.0, load=60.0)
-    assert (near.abstains == (near.std > 0.8 * near.prior_std)).all()
-    assert near.abstains.any()
-    assert estimator(slip=0.3, torque=3000.0, load=60.0).abstains.all()
 
 
 def test_the_probe_detects_a_runtime_with_other_results(estimator, tmp_path, small_model):
@@ -131,8 +115,7 @@ def test_the_probe_detects_a_runtime_with_other_results(estimator, tmp_path, sma
         Estimator.load(signed(small_model, tmp_path / "other.onnx", probe=json.dumps(probe)))
 
 
-def test_a_short_name_is_a_file_or_a_released_one(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_short_name_is_a_file_or_a_released_one(workplace):
     assert find_model("wheel") == released_models()["wheel"]
     for path in ("folder/wheel", "wheel.onnx", Path("folder") / "wheel"):
         assert find_model(path) == Path(path)  # that it is missing is said when it is opened

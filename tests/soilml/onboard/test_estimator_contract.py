@@ -116,14 +116,18 @@ def test_the_memory_of_another_file_or_wheel_is_refused(whole, any_set_file, whe
     ("change", "said"),
     [
         ({"file": ""}, "another file"),
-        ({"system": np.zeros((2, 5))}, "is damaged: its system has shape (2, 5)"),
-        ({"counts": np.zeros(2)}, "is damaged"),
-        ({"counts": np.full(3, np.nan)}, "is damaged"),
+        ({"system": lambda kept: np.zeros((2, 5))}, "is damaged: its system has shape (2, 5)"),
+        ({"system": lambda kept: np.full_like(kept, np.nan)}, "is damaged"),
+        ({"system": lambda kept: kept * ([1, np.inf] + [1] * (kept.shape[1] - 2))}, "is damaged"),
+        ({"counts": lambda kept: np.zeros(2)}, "is damaged"),
+        ({"counts": lambda kept: np.full(3, np.nan)}, "is damaged"),
         ({"system": "text"}, "memory is 'text'"),
     ],
 )
 def test_a_changed_memory_is_refused(whole, change, said):
-    memory = replace(whole.start(), **change)
+    _, memory = whole.step(whole.start(), **ONE)
+    changed = {k: v(getattr(memory, k)) if callable(v) else v for k, v in change.items()}
+    memory = replace(memory, **changed)
     with pytest.raises(InputError) as error:
         whole.step(memory, **ONE)
     assert said in line_of(error)

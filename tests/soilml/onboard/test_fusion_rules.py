@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from soilml.onboard.fusion_rules import (
-    best_linear,
-    inverse_variance,
-    pairwise,
-    shrink_correlation,
-)
+from soilml.onboard.fusion_rules import best_linear, inverse_variance, pairwise, shrink_correlation
 
 #: Comin and Saaj 2017: variances of torque and vibration, weight of torque. The printed variances
 #: are rounded to 0.001, which moves the weight by up to about 0.015.

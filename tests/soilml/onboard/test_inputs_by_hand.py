@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_estimates import made_estimate
 
-from soilml.onboard.estimate import Estimate, PriorSummary, Reason
+from soilml.onboard.estimate import PriorSummary, Reason
 from soilml.onboard.multi_sensor import fuse_estimates
 from soilml.onboard.set_contract import (
     ABSENT_READING,
@@ -87,12 +88,8 @@ def test_the_weighted_logarithm_of_torques_with_constant_noise_has_no_bias(const
 PRIOR = PriorSummary(*np.asarray([[1.0, 10.0], [0.5, 4.0], [0.0, 2.0], [2.0, 18.0]]))
 
 
-def estimates(mean, std, in_range, prior=PRIOR):
-    mean, std = np.asarray(mean, dtype=float), np.asarray(std, dtype=float)
-    covariance = std[..., None] ** 2 * np.eye(2)
-    return Estimate.gaussian(
-        *(("a", "b"), ("1", "1"), prior, mean, covariance, std, np.asarray(in_range), np.ones(2))
-    )
+def estimates(mean, std, in_range):
+    return made_estimate(mean, std, PRIOR, in_range, ("a", "b"), ("1", "1"), factor=1.0)
 
 
 def test_fused_rows_keep_shape_ends_and_reasons():

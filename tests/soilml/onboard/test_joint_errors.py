@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from made_estimates import made_estimate
 
-from soilml.onboard.estimate import Estimate, PriorSummary, Reason
+from soilml.onboard.estimate import PriorSummary, Reason
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.joint_errors import joint_errors
 from soilml.onboard.multi_sensor import fuse_estimates
@@ -60,18 +61,8 @@ class Sensors:
 
 
 def estimate(mean, std, errors):
-    mean, std = (np.broadcast_to(x, np.shape(mean))[..., None] for x in (mean, std))
-    return Estimate(
-        names=("slip",),
-        units=("1",),
-        mean=mean,
-        std=std,
-        covariance=std[..., None] ** 2,
-        low=mean - 1.645 * std,
-        high=mean + 1.645 * std,
-        in_range=np.ones(mean.shape[:-1], dtype=bool),
-        prior=PRIOR,
-        errors=errors,
+    return made_estimate(
+        np.asarray(mean)[..., None], np.asarray(std)[..., None], PRIOR, errors=errors
     )
 
 

@@ -4,27 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_estimates import made_estimate
 
 from soilml.errors import InputError
-from soilml.onboard.estimate import Estimate, PriorSummary
+from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.multi_sensor import fuse_estimates
 
 PRIOR = PriorSummary(np.asarray([0.3]), np.asarray([0.15]), np.asarray([-0.3]), np.asarray([0.9]))
 
 
-def estimate(mean, std, in_range=True, prior=PRIOR, names=("slip",)):
+def estimate(mean, std, prior=PRIOR, **known):
     mean, std = (np.asarray(x, float)[..., None] for x in np.broadcast_arrays(mean, std))
-    return Estimate(
-        names=names,
-        units=("1",),
-        mean=mean,
-        std=std,
-        covariance=std[..., None] ** 2,
-        low=mean - 1.7 * std,
-        high=mean + 1.7 * std,
-        in_range=np.broadcast_to(np.asarray(in_range), mean.shape[:-1]),
-        prior=prior,
-    )
+    return made_estimate(mean, std, prior, factor=1.7, **known)
 
 
 def posteriors(rows=20000, noise=(0.1, 0.2)):
@@ -51,13 +42,6 @@ def test_the_prior_counts_once():
     assert rms(once.mean[:, 0] - truth) == pytest.approx(exact, rel=0.02)
     inside = (once.low[:, 0] <= truth) & (truth <= once.high[:, 0])
     assert inside.mean() == pytest.approx(0.9, abs=0.01)
-
-
-def test_sensors_that_contradict_each_other_give_the_prior():
-    quarrel = fuse_estimates([estimate(0.1, 0.02), estimate(0.5, 0.02)])
-    assert not quarrel.used.any() and not bool(quarrel.estimate.in_range)
-    np.testing.assert_array_equal(quarrel.estimate.mean, PRIOR.mean)
-    assert bool(fuse_estimates([estimate(0.1, 0.1), estimate(0.5, 0.1)]).estimate.in_range)
 
 
 def test_what_does_not_belong_together_is_refused():

@@ -1,5 +1,6 @@
 """Estimates of a model file where a narrower prior is known."""
 
+import csv
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.stats import multivariate_normal
 from datagen.recipe import read_recipe
 from soilml import Estimator, Operating, Table, identify
 from soilml.cli import main
+from soilml.io.text_tables import csv_text
 from soilml.numerics.prior import Prior
 from soilml.onboard.estimate import Reason
 from soilml.onboard.narrower_prior import truncated_normal
@@ -88,25 +90,18 @@ def test_readings_that_contradict_it_are_flagged(rover):
     assert found.abstains.all()
 
 
-def test_the_command_takes_a_narrower_prior_of_the_case(tmp_path, model_file, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_the_command_takes_a_narrower_prior_of_the_case(workplace, model_file, capsys):
     wheel = model_file.read_text()
-    (tmp_path / "narrow.toml").write_text(wheel.replace("3000.0", "700.0"))
+    (workplace / "narrow.toml").write_text(wheel.replace("3000.0", "700.0"))
     rows = readings(np.random.default_rng(5), [600.0, 0.6, 0.015], 8)
-    lines = ["run,slip,load_N,torque_Nm"]
-    lines += [
-        f"a,{s},{w},{t}"
-        for s, w, t in zip(*(rows[k] for k in ("slip", "load", "torque")), strict=True)
-    ]
-    (tmp_path / "runs.csv").write_text("\n".join(lines) + "\n")
+    columns = dict(zip(("slip", "load_N", "torque_Nm"), rows.values(), strict=True))
+    (workplace / "runs.csv").write_text(csv_text({"run": ["a"] * 8} | columns))
     std = {}
     for case in ("model.toml", "narrow.toml"):
         command = ["estimate", "wheel", "runs.csv", "--model", case, "--by", "run"]
         assert main([*command, "--format", "csv"]) == 0
         captured = capsys.readouterr()
-        head, line = captured.out.strip().splitlines()[:2]
-        std[case] = float(
-            dict(zip(head.split(","), line.split(","), strict=True))["cohesion_Pa_std"]
-        )
+        (row,) = csv.DictReader(captured.out.splitlines())
+        std[case] = float(row["cohesion_Pa_std"])
         assert "is ignored" not in captured.err
     assert std["narrow.toml"] < 0.9 * std["model.toml"]

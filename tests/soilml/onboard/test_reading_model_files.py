@@ -34,14 +34,13 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path, monkeypatch):
     assert "has 4 MB; a model file has at most 3 MB" in message(tmp_path / "m.onnx")
 
 
-def test_weights_in_another_file_are_refused(small_model, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_weights_in_another_file_are_refused(small_model, workplace):
     model = onnx.load(small_model)
     tensor = max(model.graph.initializer, key=lambda tensor: len(tensor.raw_data))
-    (tmp_path / "weights").write_bytes(tensor.raw_data)
+    (workplace / "weights").write_bytes(tensor.raw_data)
     set_external_data(tensor, "weights")
     tensor.ClearField("raw_data")
-    signed(model, tmp_path / "m.onnx")
+    signed(model, workplace / "m.onnx")
     with pytest.raises(ModelFileError, match="weights in other files"):
         Estimator.load("m.onnx")
 

@@ -17,11 +17,6 @@ EXACT = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0)
 
 
 @pytest.fixture(scope="module")
-def estimator(wheel_set_file):
-    return Estimator.load(wheel_set_file)
-
-
-@pytest.fixture(scope="module")
 def any_wheel(any_set_file):
     return Estimator.load(any_set_file)
 
@@ -34,9 +29,9 @@ def assert_similar(a, b, tolerance=0.05):
 
 
 @pytest.mark.slow
-def test_the_soil_is_inside_the_interval(estimator, wheel_posterior):
+def test_the_soil_is_inside_the_interval(wheel_sets, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 24)
-    found = estimator.run(**run)
+    found = wheel_sets.run(**run)
     axes, x = wheel_posterior.family.axes, (0.2, -0.3, 0.1)
     truth = np.asarray([axis.value(np.asarray(v)) for axis, v in zip(axes, x, strict=True)])
     assert found.in_range
@@ -44,54 +39,53 @@ def test_the_soil_is_inside_the_interval(estimator, wheel_posterior):
     assert (found.std < found.prior_std).all()
 
 
-def test_the_order_of_rows_changes_nothing(estimator, wheel_posterior):
+def test_the_order_of_rows_changes_nothing(wheel_sets, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 16)
     order = np.random.default_rng(1).permutation(16)
-    assert_similar(estimator.run(**{k: v[order] for k, v in run.items()}), estimator.run(**run))
+    assert_similar(wheel_sets.run(**{k: v[order] for k, v in run.items()}), wheel_sets.run(**run))
 
 
-def test_steps_by_row_give_the_estimate_of_the_whole_run(estimator, wheel_posterior):
+def test_steps_by_row_give_the_estimate_of_the_whole_run(wheel_sets, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 12)
-    memory = estimator.start()
+    memory = wheel_sets.start()
     for i in range(12):
-        found, memory = estimator.step(memory, **{k: v[i] for k, v in run.items()})
+        found, memory = wheel_sets.step(memory, **{k: v[i] for k, v in run.items()})
     assert memory.rows == 12
     # errors of slip and load are linear at the soil that is known when a row arrives
-    assert_similar(found, estimator.run(**run), 0.15)
-    exact = estimator.on(**EXACT)
+    assert_similar(found, wheel_sets.run(**run), 0.15)
+    exact = wheel_sets.on(**EXACT)
     memory = exact.start()
     for i in range(12):
         found, memory = exact.step(memory, **{k: v[i] for k, v in run.items()})
     assert_similar(found, exact.run(**run))
 
 
-def test_copies_of_a_row_count_once(estimator, wheel_posterior):
+def test_copies_of_a_row_count_once(wheel_sets, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 6)
     copied = {k: np.concatenate([v, v[:3], v]) for k, v in run.items()}
-    assert_similar(estimator.run(**copied), estimator.run(**run), 1e-5)
+    assert_similar(wheel_sets.run(**copied), wheel_sets.run(**run), 1e-5)
 
 
-def test_a_declared_constant_noise_is_fed_as_the_interface_says(estimator, wheel_posterior):
+def test_a_declared_constant_noise_is_fed_as_the_interface_says(wheel_sets, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 8)
     constant, share = 0.2, 0.01
-    declared = estimator.on(noise={"torque": (constant, share)}).run(**run)
+    declared = wheel_sets.on(noise={"torque": (constant, share)}).run(**run)
     std = np.hypot(constant, share * run["torque"])
     factor = np.exp(-2.0 * (constant / run["torque"]) ** 2)
     fed = run | {"torque": run["torque"] * factor, "torque_std": std * factor}
-    assert_similar(declared, estimator.run(**fed), 1e-5)
-    by_row = estimator.run(**run, torque_std=std)
+    assert_similar(declared, wheel_sets.run(**fed), 1e-5)
+    by_row = wheel_sets.run(**run, torque_std=std)
     assert (np.abs(declared.mean - by_row.mean) > 1e-3 * by_row.std).any()
 
 
-def test_the_estimate_out_of_range_is_the_prior(estimator, wheel_posterior):
+def test_the_estimate_out_of_range_is_the_prior(wheel_sets, wheel_posterior):
     upper = wheel_posterior.family.recipe.load.upper
-    found = estimator.run(slip=0.3, load=3.0 * upper, torque=0.05 * upper)
+    found = wheel_sets.run(slip=0.3, load=3.0 * upper, torque=0.05 * upper)
     assert not found.in_range
-    assert found.mean == pytest.approx(estimator.prior.mean, rel=1e-5)
-    assert found.std == pytest.approx(estimator.prior.std, rel=1e-5)
+    assert found.mean == pytest.approx(wheel_sets.prior.mean, rel=1e-5)
+    assert found.std == pytest.approx(wheel_sets.prior.std, rel=1e-5)
 
 
-@pytest.mark.slow
 def test_a_file_for_any_wheel_requires_its_context(any_wheel):
     with pytest.raises(InputError, match="wheel_radius"):
         any_wheel.run(slip=0.3, torque=2.0, load=60.0)
@@ -107,20 +101,20 @@ def test_a_context_out_of_range_is_refused(any_wheel, name):
 
 
 @pytest.mark.parametrize("key", ["terms", "noise", "context", "alone"])
-def test_a_set_that_lacks_a_key_is_refused(estimator, wheel_set_file, tmp_path, key):
-    of_set = json.loads(estimator.metadata["set"])
+def test_a_set_that_lacks_a_key_is_refused(wheel_sets, wheel_set_file, tmp_path, key):
+    of_set = json.loads(wheel_sets.metadata["set"])
     del of_set[key]
     with pytest.raises(ModelFileError, match="metadata is damaged"):
         Estimator.load(signed(wheel_set_file, tmp_path / "m.onnx", set=json.dumps(of_set)))
 
 
-def test_more_rows_than_one_call_takes_are_read_in_parts(estimator, wheel_posterior, monkeypatch):
+def test_more_rows_than_one_call_takes_are_read_in_parts(wheel_sets, wheel_posterior, monkeypatch):
     rows, _ = simulated_run(wheel_posterior, 60)
-    exact = estimator.on(model_error=0.0)
-    whole, averaged = exact.run(**rows), estimator.run(**rows)
+    exact = wheel_sets.on(model_error=0.0)
+    whole, averaged = exact.run(**rows), wheel_sets.run(**rows)
     monkeypatch.setattr("soilml.onboard.set_posterior.ROWS_PER_CALL", 16)
     parts = exact.run(**rows)
     assert_similar(parts, whole)
     # errors of the model are linear at the soil that is known when a row arrives
-    assert (np.abs(estimator.run(**rows).mean - averaged.mean) < 0.5 * averaged.std).all()
+    assert (np.abs(wheel_sets.run(**rows).mean - averaged.mean) < 0.5 * averaged.std).all()
     assert (parts.mean != whole.mean).any() and parts.rows_used == 60  # not the same computation

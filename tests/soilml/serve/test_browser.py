@@ -90,17 +90,6 @@ def now(tab):
     return {name: float(v.split("\u00a0")[0].replace("\u2212", "-")) for name, v in pairs}
 
 
-def drop_a_table(tab, tmp_path, model):
-    """Drop a table, and answer the question which wheel drove it."""
-    tab.set_input_files("#file", runs_file(tmp_path, model))
-    tab.get_by_label("Radius (mm)").fill("150")
-    tab.get_by_label("Width (mm)", exact=True).fill("120")
-    tab.select_option("#wheel-soil", "wong1989/dry_sand")
-    assert tab.locator("#ask").is_hidden()
-    tab.get_by_role("button", name="Use this wheel").click()
-    tab.wait_for_selector("#answers iframe", timeout=LONG)
-
-
 def answer(tab, title):
     """The report below a title, once it is as high as its content."""
     place = f"[data-title='{title}'] iframe"
@@ -159,7 +148,13 @@ def test_the_example_leads_to_a_verdict_a_cause_and_a_better_soil(tab):
 
 
 def test_a_dropped_table_needs_its_wheel_and_a_wrong_model_is_shown_in_its_line(tab, tmp_path):
-    drop_a_table(tab, tmp_path, Model(Wheel(radius=0.15, width=0.12)))
+    tab.set_input_files("#file", runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12))))
+    tab.get_by_label("Radius (mm)").fill("150")
+    tab.get_by_label("Width (mm)", exact=True).fill("120")
+    tab.select_option("#wheel-soil", "wong1989/dry_sand")
+    assert tab.locator("#ask").is_hidden()
+    tab.get_by_role("button", name="Use this wheel").click()
+    tab.wait_for_selector("#answers iframe", timeout=LONG)
     answer(tab, "The soil")
     tab.locator("#model-box summary").click()
     text = tab.locator("#model-text")

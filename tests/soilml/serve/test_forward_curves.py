@@ -2,27 +2,12 @@
 
 import numpy as np
 import pytest
+from conftest import MODEL
 
 from soilml import EFFECTS, Model, Operating, Wheel, soil
 from soilml.errors import InputError
 from soilml.serve.chosen_case import WHEELS
 from soilml.serve.forward_curves import controls, forward
-
-MODEL = """\
-[gear]
-type = "wheel"
-radius = 0.1
-width = 0.08
-[soil]
-name = "wong1989/dry_sand"
-[soil.prior]
-cohesion = [0.0, 3000.0]
-[noise]
-torque_Nm = "5 %"
-[[effect]]
-name = "slip-sinkage"
-n1 = 0.3
-"""
 
 
 def sliders(request):
@@ -71,7 +56,7 @@ def test_every_wheel_stands_on_every_soil_that_carries_it(wheel):
         ({"values": {"cohesive": 1.0}}, "no parameter 'cohesive'"),
         ({"values": [1]}, "needed are numbers by name"),
         ({"model": "[gear"}, "MODEL.toml"),
-        ({"model": MODEL.replace("0.08", "-3")}, "MODEL.toml"),
+        ({"model": MODEL.replace("0.12", "-3")}, "MODEL.toml"),
     ],
     ids=str,
 )

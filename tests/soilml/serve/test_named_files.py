@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from conftest import MODEL
 from served_page import page as page
 from served_page import runs_file
 
@@ -11,18 +12,6 @@ from soilml.errors import InputError
 from soilml.serve.forward_curves import controls, forward
 
 SECRET = "root:x:0:0:the first line of a file that is not the page's"
-MODEL = """\
-[gear]
-type = "wheel"
-radius = 0.15
-width = 0.12
-[soil]
-name = "wong1989/dry_sand"
-[soil.prior]
-cohesion = [0.0, 3000.0]
-[noise]
-torque_Nm = "2 %"
-"""
 RANGES = "slip = [0.05, 0.6]\nload_N = [30, 110]\n"
 WITHIN = "runs = { slip = [0.1], load_N = [60] }\n"
 #: Every key of a model file that names a file or a program.

@@ -24,14 +24,21 @@ def test_a_port_in_use_is_one_line(capsys):
     assert f"port {port} of 127.0.0.1 cannot be opened" in said and "--port N" in said
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-def test_a_signal_ends_it_in_one_line_and_removes_its_files(name, tmp_path):
-    process = serve("--port", "0", env={"TMPDIR": str(tmp_path)})
+def at_work(folder):
+    """A server whose worker has begun an analysis."""
+    process = serve("--port", "0", env={"TMPDIR": str(folder)})
     page = Page(process)
     key = page.put("RUNS.csv", b"run,slip,load_N,torque_Nm\na,0.3,60,2.26\n")
     job, _ = page.ask("/api/jobs", {"kind": "gap", "files": [key], "model": MODEL})
-    assert job["state"] == "running" and list(tmp_path.iterdir())
+    assert job["state"] == "running"
+    return process
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_ends_it_in_one_line_and_removes_its_files(name, tmp_path):
+    process = at_work(tmp_path)
+    assert list(tmp_path.iterdir())
     process.send_signal(getattr(signal, name))
     _, said = process.communicate(timeout=60)
     assert process.returncode == 128 + getattr(signal, name)
@@ -42,10 +49,7 @@ def test_a_signal_ends_it_in_one_line_and_removes_its_files(name, tmp_path):
 @pytest.mark.slow
 def test_a_worker_ends_with_its_server(tmp_path):
     """Even where the server is killed: the worker sees the end of its input."""
-    process = serve("--port", "0", env={"TMPDIR": str(tmp_path)})
-    page = Page(process)
-    key = page.put("RUNS.csv", b"run,slip,load_N,torque_Nm\na,0.3,60,2.26\n")
-    page.ask("/api/jobs", {"kind": "gap", "files": [key], "model": MODEL})
+    process = at_work(tmp_path)
     process.kill()
     process.communicate(timeout=60)
     until = time.monotonic() + 60.0

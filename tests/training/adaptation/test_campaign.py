@@ -4,27 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import MODEL
 
 from datagen.recipe import read_recipe
 from soilml import SlipSinkage, read_case
 from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
-from training.adaptation.campaign import (
-    DrivenRange,
-    recipe_text,
-    split_runs,
-    within_carried_loads,
-)
+from training.adaptation.campaign import DrivenRange, recipe_text, split_runs, within_carried_loads
 from training.set_posterior.families.recipe_family import RecipeFamily
 
 
 @pytest.fixture
-def case(tmp_path):
-    path = tmp_path / "model.toml"
-    path.write_text(MODEL)
-    return read_case(path)
+def case(model_file):
+    return read_case(model_file)
 
 
 def log(runs=8, rows=4, **more):

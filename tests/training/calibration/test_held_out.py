@@ -9,13 +9,10 @@ from training.dataset import Dataset
 FACTOR = np.asarray([1.645])
 
 
-def rows(lengths, steady, seed=0):
-    """Runs of these lengths; slip and load are constant in each where `steady`."""
-    rng = np.random.default_rng(seed)
-    run = np.repeat(np.arange(len(lengths)), lengths)
-    n = len(run)
-    pick = run if steady else np.arange(n)
-    slip, load = rng.uniform(0.0, 0.6, n)[pick], rng.uniform(10.0, 40.0, n)[pick]
+def steady_rows():
+    """Thousand runs of eight rows; slip and load are constant in each."""
+    rng, run, n = np.random.default_rng(0), np.repeat(np.arange(1000), 8), 8000
+    slip, load = rng.uniform(0.0, 0.6, n)[run], rng.uniform(10.0, 40.0, n)[run]
     soil, noise = rng.normal(size=n)[run], rng.normal(size=n)
     return Dataset(
         measured={"torque": 0.1 * load, "load": load},
@@ -43,7 +40,7 @@ def sensor(share, data):
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.2, 0.6, 0.95])
 def test_the_share_of_error_in_common_is_found(share):
-    data = rows([8] * 1000, True)
+    data = steady_rows()
     found = measure_held_out(*sensor(share, data), data, FACTOR)
     assert found.repeats.tolist() == [1, 2, 4, 8]
     assert found.common_share()[0] == pytest.approx(share, abs=0.06)

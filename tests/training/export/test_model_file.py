@@ -4,14 +4,15 @@ import json
 
 import numpy as np
 import pytest
+from conftest import RECIPE
 from onnx.reference import ReferenceEvaluator
+from trained_by_text import trained_by
 
+from datagen.generate import generate
+from datagen.recipe import read_recipe
 from soilml import Estimator
 from soilml.onboard.features import compute_features
-from training.dataset import read_dataset
 from training.export.model_file import export_model
-from training.spec import read_spec
-from training.train import train
 
 pytestmark = pytest.mark.slow
 
@@ -20,37 +21,20 @@ MEMBERS = {
     "mlp": '[[regressor]]\ntype = "mlp"\nhidden = [16, 16]\nepochs = 6\n',
     "linear": '[[regressor]]\ntype = "linear"\n',
 }
+MEMBERS["fused"] = "".join(MEMBERS.values())
 
 
 @pytest.fixture(scope="module")
 def few_rows(tmp_path_factory):
-    from conftest import RECIPE
-
-    from datagen.generate import generate
-    from datagen.recipe import read_recipe
-
     folder = tmp_path_factory.mktemp("few")
     (folder / "recipe.toml").write_text(RECIPE.format(rows=1200, seed=9))
     generate(read_recipe(folder / "recipe.toml"), folder / "data.parquet")
     return folder / "data.parquet"
 
 
-def trained(tmp_path, data_path, text):
-    (tmp_path / "spec.toml").write_text(text)
-    spec = read_spec(tmp_path / "spec.toml")
-    return train(spec, read_dataset(data_path, spec.features, spec.targets))
-
-
-def specs():
-    for kind, text in MEMBERS.items():
-        yield pytest.param(text, id=kind)
-    members = MEMBERS["fixed-size-lssvm"] + MEMBERS["mlp"] + MEMBERS["linear"]
-    yield pytest.param(members, id="fused")
-
-
-@pytest.mark.parametrize("text", list(specs()))
+@pytest.mark.parametrize("text", MEMBERS.values(), ids=MEMBERS)
 def test_the_file_agrees_with_the_original_over_the_whole_box(tmp_path, few_rows, text):
-    original = trained(tmp_path, few_rows, text)
+    original = trained_by(text, few_rows, tmp_path)
     metadata = export_model(original, tmp_path / "m.onnx", few_rows)
     estimator = Estimator.load(tmp_path / "m.onnx")
     rng = np.random.default_rng(0)
@@ -69,8 +53,8 @@ def test_the_file_agrees_with_the_original_over_the_whole_box(tmp_path, few_rows
 
 
 def test_a_second_runtime_agrees(tmp_path, few_rows):
-    members = MEMBERS["fixed-size-lssvm"] + MEMBERS["mlp"] + MEMBERS["linear"]
-    export_model(trained(tmp_path, few_rows, members), tmp_path / "m.onnx", few_rows)
+    original = trained_by(MEMBERS["fused"], few_rows, tmp_path)
+    export_model(original, tmp_path / "m.onnx", few_rows)
     estimator = Estimator.load(tmp_path / "m.onnx")
     reference = ReferenceEvaluator(str(tmp_path / "m.onnx"))
     rng = np.random.default_rng(1)

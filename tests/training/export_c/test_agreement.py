@@ -9,11 +9,9 @@ sets by 6e-4. The error of the sampling itself is 0.1. C is allowed a small
 multiple of the former.
 """
 
-import json
-
 import numpy as np
 import pytest
-from compiled_c import COMPILERS, ROOT
+from compiled_c import COMPILERS
 from simulated_rows import context_of, rows_of
 
 from soilml import Estimator
@@ -39,7 +37,7 @@ SETS = ["wheel", "any_wheel", "wheel_small", "any_wheel_small"]
 
 
 def estimator_of(name, context):
-    estimator = Estimator.load(ROOT / "exported" / f"{name}.onnx")
+    estimator = Estimator.load(name)
     return estimator.on(**context) if context else estimator
 
 
@@ -120,27 +118,3 @@ def test_streams_of_300_rows(name, compiled):
         assert (worst[:2] < LONG).all() and (worst[2:] < LONG_ENDS).all()
     else:
         assert_close(found)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [*SETS, "kls1_wheel", "wheel_lssvm", "wheel_mlp"])
-def test_each_file_reproduces_its_probe(name, compiled):
-    """Readings whose answers the file itself has."""
-    model = compiled(name)
-    metadata = estimator_of(name, None).metadata
-    outputs = json.loads(metadata["outputs"])
-    for probe in json.loads(metadata["probe"]):
-        readings = {k: np.float32(v) for k, v in probe["readings"].items()}
-        if "given" in probe:
-            own = model.start(**probe["given"])
-            assert model.step(own, model.rows(**readings))[0] == 0
-            found = [model.answer(own)[1]]
-        else:
-            found = [model.single(row)[1] for row in model.rows(**readings)]
-        for key in ("mean", "std"):
-            answers = np.array([answer[key] for answer in found]).reshape(np.shape(probe[key]))
-            scale = [entry["prior_std"] for entry in outputs]
-            scale = scale * np.array(
-                [probe.get("given", {}).get(e.get("scale"), 1) for e in outputs]
-            )
-            assert (np.abs(answers - probe[key]) < 1e-3 * scale).all()

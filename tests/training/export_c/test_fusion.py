@@ -27,10 +27,6 @@ CODES = {
 ENDS = ("mean", "std", "low", "high")
 
 
-def released(name):
-    return Estimator.load(ROOT / "exported" / f"{name}.onnx")
-
-
 def build(folder, sources, compiler=COMPILERS[0] if COMPILERS else "", level="-O1"):
     out = folder / "fused.so"
     command = [compiler, *WARNINGS, level, "-shared", "-fPIC", f"-I{folder}", *sources, "-lm"]
@@ -86,7 +82,11 @@ def slip(request, tmp_path_factory):
     assert main(["export-fusion", *models, str(folder / "slip.c")]) == 0
     library = build(folder, [f"{name}.c" for name in (*names, "slip")])
     parts = [CompiledModel(folder / f"{name}.h", library) for name in names]
-    return CompiledModel(folder / "slip.h", library), parts, [released(name) for name in names]
+    return (
+        CompiledModel(folder / "slip.h", library),
+        parts,
+        [Estimator.load(name) for name in names],
+    )
 
 
 def test_slip_from_torque_and_vibration(slip):
@@ -158,7 +158,7 @@ def errors_like(rng, estimator, common, own, size):
 
 def test_files_of_three_quantities(tmp_path):
     """By files with made-up errors."""
-    base, rng = released("wheel_linear"), np.random.default_rng(1)
+    base, rng = Estimator.load("wheel_linear"), np.random.default_rng(1)
     common = rng.standard_normal((900, 3))
     kinds = ((0.5, 0.3), (0.9, 0.5))
     estimators = [replace(base, errors=errors_like(rng, base, common, *kind)) for kind in kinds]
@@ -185,20 +185,9 @@ def test_files_of_three_quantities(tmp_path):
         covariance = raw / scale[:, :, None] / scale[:, None] * std[:, :, None] * std[:, None]
         mean = truth + std * 1.2 * own * rng.standard_normal((400, 3))
         mean[:4] += 9.0 * std[:4] * rng.choice([-1, 1])
-        estimates.append(
-            Estimate.gaussian(
-                base.names,
-                base.units,
-                base.prior,
-                np.float32(mean).astype(float),
-                np.float32(covariance).astype(float),
-                np.float32(std).astype(float),
-                rng.random(400) < 0.7,
-                np.full(3, 1.645),
-                estimator.errors,
-            )
-        )
-    estimates = [replace(e, load=np.full(400, 60.0)) for e in estimates]
+        rounded = (np.float32(x).astype(float) for x in (mean, covariance, std))
+        known = (rng.random(400) < 0.7, np.full(3, 1.645), estimator.errors, np.full(400, 60.0))
+        estimates.append(Estimate.gaussian(base.names, base.units, base.prior, *rounded, *known))
     codes = compare(fusion, [struct] * 2, estimates, loads=True)
     assert {*codes} == {0, 1, 2}
 

@@ -1,13 +1,12 @@
 """Every operator that export c knows: the compiled C against onnxruntime."""
 
 import ctypes
-import subprocess
 from math import prod
 
 import numpy as np
 import onnxruntime as ort
 import pytest
-from compiled_c import COMPILERS, TYPES, WARNINGS
+from compiled_c import COMPILERS, TYPES, compile_library
 from onnx import TensorProto, helper, numpy_helper
 
 from soilml.errors import ModelFileError
@@ -142,18 +141,8 @@ def library(folder, functions, shared):
     )
     source, out = folder / "operators.c", folder / "operators.so"
     source.write_text(text)
-    flags = [
-        *WARNINGS,
-        "-Wno-unused",
-        "-Wno-error=unused-const-variable",
-        "-O1",
-        "-shared",
-        "-fPIC",
-    ]
-    command = [COMPILERS[0], *flags, source, "-o", out, "-lm"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr[:3000]
-    return ctypes.CDLL(str(out))
+    unused = ("-Wno-unused", "-Wno-error=unused-const-variable")
+    return ctypes.CDLL(str(compile_library(source, out, COMPILERS[0], *unused)))
 
 
 def called(compiled, function, given):

@@ -10,10 +10,7 @@ from compiled_c import COMPILERS, ROOT, WARNINGS
 from simulated_rows import rows_of
 from test_agreement import ONE_FIRST
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not COMPILERS, reason="no C compiler"),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILERS, reason="no C compiler")]
 EXAMPLES = ROOT / "examples" / "board"
 SANITIZERS = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 FIELDS = ("slip", "torque", "load", "sinkage", "drawbar_pull")
@@ -31,13 +28,19 @@ def run(program, given=""):
     return done.stdout
 
 
+def lines_of(source, name, exported, library, program, compiler=None):
+    """What a program around a released file prints; without a compiler it is C++."""
+    folder, made = exported(name), library(name, *([compiler] if compiler else []))
+    words = [compiler, *WARNINGS] if compiler else ["g++", "-std=c++11", *WARNINGS[1:]]
+    command = [*words, f"-I{folder}", source, made, f"-Wl,-rpath,{made.parent}", "-lm"]
+    build([*command, "-o", program])
+    return run(program).splitlines()
+
+
 @pytest.mark.parametrize("compiler", ONE_FIRST)
 def test_the_c_example(compiler, exported, library, tmp_path):
-    folder, program, made = exported("wheel"), tmp_path / "board", library("wheel", compiler)
-    command = [compiler, *WARNINGS, f"-I{folder}", EXAMPLES / "main.c", made]
-    build([*command, f"-Wl,-rpath,{made.parent}", "-lm", "-o", program])
-    *_, last = run(program).splitlines()
-    assert last == "answered"
+    example, program = EXAMPLES / "main.c", tmp_path / "board"
+    assert lines_of(example, "wheel", exported, library, program, compiler)[-1] == "answered"
 
 
 @pytest.mark.parametrize("flag", ["-ffast-math", "-Ofast", "-ffinite-math-only"])
@@ -54,20 +57,16 @@ def test_the_walk_through_of_the_page(compiler, exported, library, tmp_path):
     """The program of docs/how-to/deploy.md, which ends with a row that is set aside."""
     page = (ROOT / "docs/how-to/deploy.md").read_text()
     (tmp_path / "main.c").write_text(re.search(r"<<'END'\n(.*?)^END$", page, re.M | re.S)[1])
-    folder, program, made = exported("wheel"), tmp_path / "board", library("wheel", compiler)
-    command = [compiler, *WARNINGS, f"-I{folder}", tmp_path / "main.c", made]
-    build([*command, f"-Wl,-rpath,{made.parent}", "-lm", "-o", program])
-    *events, identity = run(program).splitlines()
+    own, program = tmp_path / "main.c", tmp_path / "board"
+    *events, identity = lines_of(own, "wheel", exported, library, program, compiler)
     assert [line.split(":")[0] for line in events] == [f"event {e}" for e in (0, 0, 0, 0, 1)]
     assert identity.startswith("wheel by soilml ")
 
 
 @pytest.mark.skipif(not shutil.which("g++"), reason="no C++ compiler")
 def test_the_cpp_example(exported, library, tmp_path):
-    folder, program, made = exported("any_wheel"), tmp_path / "board", library("any_wheel")
-    command = ["g++", "-std=c++11", *WARNINGS[1:], f"-I{folder}", EXAMPLES / "main.cpp", made]
-    build([*command, f"-Wl,-rpath,{made.parent}", "-lm", "-o", program])
-    lines = run(program).splitlines()
+    example, program = EXAMPLES / "main.cpp", tmp_path / "board"
+    lines = lines_of(example, "any_wheel", exported, library, program)
     assert len(lines) == 2 and all(line.endswith(", in range") for line in lines)
 
 

@@ -1,5 +1,6 @@
 """Every released file as C: it compiles without a warning, and answers as onnxruntime does."""
 
+import ctypes
 import json
 import subprocess
 
@@ -18,10 +19,6 @@ SINGLES = [name for name in RELEASED if not name.startswith("any_wheel")]
 SETS = ["any_wheel", "any_wheel_small", "kls1_wheel", "wheel", "wheel_small"]
 #: Largest difference of an estimate from one row, which is computed in double.
 SINGLE = 1e-5
-
-
-def loaded(name):
-    return Estimator.load(ROOT / "exported" / f"{name}.onnx")
 
 
 def test_the_lists_of_this_file_cover_all_released_files():
@@ -50,7 +47,11 @@ def test_it_compiles_without_a_warning(name, compiler, exported):
 @pytest.mark.parametrize("name", SINGLES)
 def test_single_readings(name, compiler, compiled):
     """Readings over the ranges of training and 20 % beyond."""
-    model, estimator, rng = compiled(name, compiler), loaded(name), np.random.default_rng(11)
+    model, estimator, rng = (
+        compiled(name, compiler),
+        Estimator.load(name),
+        np.random.default_rng(11),
+    )
     readings = {}
     for entry in json.loads(estimator.metadata["inputs"]):
         reach = 0.2 * (entry["upper"] - entry["lower"])
@@ -81,14 +82,14 @@ def probe_rows(estimator, rng, count):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["kls1_wheel"])
-def test_sets_and_steps(name, compiled):
+def test_sets_and_steps(compiled):
     """Of a wheel of other sizes: sets in one call, and the same rows in steps of 1 to 8."""
-    model, plain, rng = compiled(name), loaded(name), np.random.default_rng(12)
+    model, plain = compiled("kls1_wheel"), Estimator.load("kls1_wheel")
+    rng = np.random.default_rng(12)
     found = []
     for _ in range(8):
         rows, given = probe_rows(plain, rng, int(rng.integers(1, 17)))
-        given = given if name.startswith("any_wheel") or rng.random() < 0.5 else {}
+        given = given if rng.random() < 0.5 else {}
         estimator = plain.on(**given) if given else plain
         expected, _ = estimator.step(estimator.start(), **rows)
         code, answer = model.update(model.start(**given), model.rows(**rows))
@@ -115,7 +116,7 @@ LACKING = ([0], [5, 6], [15], list(range(9)), list(range(1, 16)), list(range(16)
 @pytest.mark.parametrize("name", SETS)
 def test_rows_that_lack_a_reading_are_left_out_as_onnxruntime_does(name, missing, compiled):
     """First, middle, last, most, all but one and all rows: counts, flags, and all numbers."""
-    model, plain = compiled(name), loaded(name)
+    model, plain = compiled(name), Estimator.load(name)
     rows, given = probe_rows(plain, np.random.default_rng(13), 16)
     estimator = plain.on(**given) if given else plain
     for lacking in LACKING:
@@ -145,7 +146,7 @@ def same_answer(answer, outputs):
 
 @pytest.mark.slow
 def test_a_context_of_zeros_is_refused_and_a_usual_one_is_that_of_the_file(compiled):
-    model, estimator = compiled("wheel"), loaded("wheel")
+    model, estimator = compiled("wheel"), Estimator.load("wheel")
     zeros, memory = model.structs["wheel_context"](), model.new("memory")
     assert model.call("set_start", memory, zeros) == model.codes["BAD_CONTEXT"]
     usual = model.new("context")
@@ -158,9 +159,7 @@ def test_a_context_of_zeros_is_refused_and_a_usual_one_is_that_of_the_file(compi
 
 @pytest.mark.parametrize("name", ["wheel_linear", "slip_torque"])
 def test_version_and_checksums_can_be_read(name, compiled, exported):
-    import ctypes
-
-    model, metadata = compiled(name), loaded(name).metadata
+    model, metadata = compiled(name), Estimator.load(name).metadata
     identity = getattr(model.library, f"{name}_identity")
     identity.restype = ctypes.c_char_p
     text, header = identity().decode(), (exported(name) / f"{name}.h").read_text()

@@ -7,10 +7,7 @@ from compiled_c import COMPILERS, ROOT
 from datagen.recipe import read_recipe
 from soilml import Estimator, simulate
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not COMPILERS, reason="no C compiler"),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILERS, reason="no C compiler")]
 #: Largest relative difference of a misfit, of which C leaves out what changes no answer.
 SAME = 0.02
 

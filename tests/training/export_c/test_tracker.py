@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bit_flips import flip_bits
 from compiled_c import COMPILERS, ROOT, CompiledModel, as_arrays, compile_library
 from simulated_rows import ANY_WHEEL
 
@@ -137,17 +138,6 @@ def test_a_bad_standard_deviation_changes_nothing(compiled):
     for value in (-1.0, np.inf):
         code, _, _ = own.read(**day(0)[5] | {"torque_std": value})
         assert code == model.codes["BAD_STD"] and bytes(own.tracker) == before
-
-
-def flip_bits(struct, count, rng):
-    """The struct's bytes with one bit flipped, so many times; it is then as it was."""
-    sound = bytes(struct)
-    for place in rng.integers(8 * len(sound), size=count):
-        found = bytearray(sound)
-        found[place // 8] ^= 1 << int(place % 8)
-        ctypes.memmove(ctypes.byref(struct), bytes(found), len(found))
-        yield bytes(found)
-    ctypes.memmove(ctypes.byref(struct), sound, len(sound))
 
 
 def test_a_tracker_in_which_a_bit_has_flipped_is_refused(compiled):

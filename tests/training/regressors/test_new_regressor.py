@@ -1,17 +1,13 @@
 """A new regressor needs its class and a line of the catalogue: card and export follow."""
 
 import numpy as np
-import pytest
+from trained_by_text import trained_by
 
 from soilml import Estimator
 from training import spec as specs
-from training.dataset import read_dataset
 from training.export.model_card import model_card
 from training.export.model_file import export_model
 from training.regressors.gaussian_regressor import GaussianRegressor
-from training.train import train
-
-pytestmark = pytest.mark.slow
 
 
 class MeanRegressor(GaussianRegressor):
@@ -29,9 +25,7 @@ class MeanRegressor(GaussianRegressor):
 
 def test_a_new_regressor_is_trained_exported_and_described(tmp_path, small_data, monkeypatch):
     monkeypatch.setitem(specs.REGRESSORS, "mean", MeanRegressor)
-    (tmp_path / "s.toml").write_text('[[regressor]]\ntype = "mean"\n')
-    spec = specs.read_spec(tmp_path / "s.toml")
-    trained = train(spec, read_dataset(small_data, spec.features, spec.targets))
+    trained = trained_by('[[regressor]]\ntype = "mean"\n', small_data, tmp_path)
     metadata = export_model(trained, tmp_path / "m.onnx", small_data)
     assert "Regressors: mean." in model_card(trained, metadata, "m")
     estimator = Estimator.load(tmp_path / "m.onnx")

@@ -8,17 +8,14 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import check_estimator
 
+import soilml.regressors
 from training.regressors.gaussian_mlp import GaussianMLP
 from training.regressors.gaussian_regressor import folds_of
 from training.regressors.linear_gaussian import LinearGaussian
 from training.regressors.lssvm import LSSVM
 from training.regressors.nystrom_features import NystromFeatures, rbf
 
-ALL = [
-    LSSVM(gamma=10.0, width=1.0),
-    LinearGaussian(),
-    GaussianMLP(),
-]
+ALL = [LSSVM(gamma=10.0, width=1.0), LinearGaussian(), GaussianMLP()]
 
 
 def curve(count, seed=0, noise=0.1):
@@ -81,11 +78,7 @@ def test_fits_a_curve_better_than_a_line_and_estimates_the_noise(regressor):
 
 def test_std_does_not_shrink_far_from_the_data():
     x, y, _ = curve(400)
-    for regressor in (
-        LSSVM(centres=50),
-        GaussianMLP(epochs=20),
-        LinearGaussian(),
-    ):
+    for regressor in (LSSVM(centres=50), GaussianMLP(epochs=20), LinearGaussian()):
         fitted = regressor.fit(x, y)
         near = fitted.predict(x, return_std=True)[1]
         far = fitted.predict(50.0 * x, return_std=True)[1]
@@ -94,8 +87,6 @@ def test_std_does_not_shrink_far_from_the_data():
 
 
 def test_the_public_regressors_work_in_pipelines_and_searches():
-    import soilml.regressors
-
     assert soilml.regressors.LSSVM is LSSVM
     assert dir(soilml.regressors) == soilml.regressors.__all__
     assert all(getattr(soilml.regressors, name) for name in soilml.regressors.__all__)

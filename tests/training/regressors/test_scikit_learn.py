@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from sklearn.ensemble import ExtraTreesRegressor
 from sklearn.kernel_ridge import KernelRidge
+from trained_by_text import trained_by
 
 from soilml import Estimator
 from soilml.errors import InputError
 from soilml.regressors import ScikitLearn
-from training.dataset import read_dataset
 from training.export.model_file import export_model
-from training.spec import read_spec
-from training.train import train
+from training.onnx_graph.builder import Graph
+from training.onnx_graph.value import Value
 
 TREES = """[[regressor]]
 type = "scikit-learn"
@@ -20,17 +20,10 @@ parameters = { n_estimators = 10, min_samples_leaf = 8, random_state = 0 }
 """
 
 
-def trained(spec, folder, data):
-    (folder / "s.toml").write_text(spec)
-    spec = read_spec(folder / "s.toml")
-    found = train(spec, read_dataset(data, spec.features, spec.targets))
-    export_model(found, folder / "m.onnx", data)
-    return found, Estimator.load(folder / "m.onnx")
-
-
-@pytest.mark.slow
 def test_the_file_says_what_the_trees_say_with_intervals_that_cover(tmp_path, small_data):
-    model, estimator = trained(TREES, tmp_path, small_data)
+    model = trained_by(TREES, small_data, tmp_path)
+    export_model(model, tmp_path / "m.onnx", small_data)
+    estimator = Estimator.load(tmp_path / "m.onnx")
     rows = model.data.features[:50]
     found = estimator(slip=rows[:, 0], torque=rows[:, 1] * rows[:, 2], load=rows[:, 2])
     mean, std, _ = model.predict(rows)
@@ -55,9 +48,6 @@ def test_what_is_no_regressor_of_scikit_learn_is_refused(name):
 
 
 def test_what_cannot_be_written_is_refused_by_name():
-    from training.onnx_graph.builder import Graph
-    from training.onnx_graph.value import Value
-
     x = np.linspace(0.0, 1.0, 30)[:, None]
     ridge = ScikitLearn(KernelRidge()).fit(x, x[:, 0])
     with pytest.raises(InputError, match="KernelRidge cannot be written as ONNX"):

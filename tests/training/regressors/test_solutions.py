@@ -2,18 +2,12 @@
 
 import numpy as np
 import pytest
+from test_regressors import curve
 
 from soilml.processes import limited_workers
 from training.regressors import nystrom_features
 from training.regressors.lssvm import LSSVM
 from training.regressors.tanh_network import TanhNetwork
-
-
-def curve(rows, seed=0, noise=0.1):
-    rng = np.random.default_rng(seed)
-    x = rng.uniform(-2.0, 2.0, (rows, 2))
-    clean = np.stack([np.sin(2.0 * x[:, 0]) + x[:, 1], x[:, 0] * x[:, 1]], axis=1)
-    return x, clean + noise * rng.normal(size=clean.shape), clean
 
 
 @pytest.mark.slow
@@ -40,12 +34,8 @@ def test_rows_of_one_soil_do_not_mislead_where_they_are_left_out_together():
     truth = np.sin(2.0 * other)
     regressor = LSSVM(centres=60)
     misled = np.sqrt(np.mean((regressor.fit(x, y).predict(other) - truth) ** 2))
-    regressor.fit_left_out(x, y, np.repeat(np.arange(80), 10), no_progress)
+    regressor.fit_left_out(x, y, np.repeat(np.arange(80), 10), lambda done, total: None)
     assert np.sqrt(np.mean((regressor.predict(other) - truth) ** 2)) < 0.75 * misled
-
-
-def no_progress(done, total):
-    pass
 
 
 def test_the_gradient_is_that_of_differences():

@@ -18,9 +18,7 @@ from soilml.quantities import SHEAR
 from training.onnx_graph.builder import Graph, session_of
 from training.onnx_graph.value import Value, constant
 from training.set_posterior.families.recipe_family import RecipeFamily
-from training.set_posterior.families.wheel_family import (
-    LAW_ERRORS,
-)
+from training.set_posterior.families.wheel_family import LAW_ERRORS
 from training.set_posterior.graph import ROW_INPUTS, SetPosteriorGraph
 from training.set_posterior.monomials import monomials
 from training.set_posterior.residual_system import add_residual_rows

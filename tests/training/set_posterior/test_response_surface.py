@@ -10,20 +10,20 @@ from soilml.errors import InputError
 from soilml.numerics.prior import Prior
 from soilml.quantities import SHEAR
 from training.set_posterior.families.recipe_family import RecipeFamily
-from training.set_posterior.response_surface import (
-    ResponseSettings,
-    check_equilibria,
-    fit_response,
-)
+from training.set_posterior.response_surface import ResponseSettings, check_equilibria, fit_response
+
+
+def errors(family, response, designs, soils):
+    """Errors of the response (designs, soils, 3), and where the wheel is carried in them."""
+    designs, rng = family.designs(designs, 99), np.random.default_rng(1)
+    x = np.stack([axis.quantile(rng.random(soils)) for axis in family.axes], axis=1)
+    true = family.responses(designs, x[None])
+    return response.predict(family.features(designs), x) - true, np.isfinite(true).all(axis=2)
 
 
 def test_the_error_of_the_response_is_as_declared(wheel_posterior):
     family, response = wheel_posterior.family, wheel_posterior.response
-    designs = family.designs(200, 99)
-    rng = np.random.default_rng(1)
-    x = np.stack([axis.quantile(rng.random(30)) for axis in family.axes], axis=1)
-    true = family.responses(designs, np.broadcast_to(x, (200, 30, 3)))
-    off = response.predict(family.features(designs), x) - true
+    off, _ = errors(family, response, 200, 30)
     rms = np.sqrt(np.nanmean(off**2, axis=(0, 1)))
     assert (rms < 1.5 * response.error).all()
     assert (response.error < 0.05).all()
@@ -47,14 +47,9 @@ def test_loads_that_soils_of_the_prior_do_not_carry_are_refused_before_anything_
 def test_designs_and_soils_are_learned_from_where_the_wheel_is_carried():
     family = family_with(kphi=Prior(2e4, 1e6, log=True))
     response = fit_response(family, ResponseSettings(256, 24, 80, 0), lambda *_: None)
-    designs = family.designs(100, 99)
-    rng = np.random.default_rng(1)
-    x = np.stack([axis.quantile(rng.random(60)) for axis in family.axes], axis=1)
-    true = family.responses(designs, x[None])
-    carried = np.isfinite(true).all(axis=2)
+    off, carried = errors(family, response, 100, 60)
     assert 0.7 < carried.mean() < 0.95 and carried.all(axis=1).mean() < 0.5
     assert response.carried == pytest.approx(carried.mean(), abs=0.03)
-    off = response.predict(family.features(designs), x) - true
     rms = np.sqrt(np.mean(off[carried] ** 2, axis=0))
     assert (rms < 1.5 * response.error).all() and (response.error < 0.15).all()
     sets = family.sets(50, 16, 1)

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from slip_step_fixtures import SLIP_EXAMPLE, SOILS
+from slip_step_fixtures import SLIP_EXAMPLE, SOILS, DrivenInC, slip_row
 
 from soilml.cli import main
 from soilml.errors import InputError, ModelFileError
@@ -25,14 +25,10 @@ def answers(slip_case, slip_drive, slip_stream):
     filter_ = SlipFilter(table, slip_case.rover.weight, slip_case.drive)
     belief, state, found = filter_.start(), slip_stream.start(), []
     for i in range(len(slip_drive.time)):
-        row = (
-            slip_drive.rim_speed[i],
-            slip_drive.torque[i],
-            slip_drive.load[i],
-            float(slip_drive.slope[i]),
-        )
-        one, belief = filter_.step(belief, *row)
-        other, state = slip_stream.step(state, *row)
+        row = slip_row(slip_drive, i)
+        *readings, _ = row.values()
+        one, belief = filter_.step(belief, *readings)
+        other, state = slip_stream.step(state, **row)
         found.append((one, other, belief, state))
     return found
 
@@ -99,69 +95,25 @@ def test_on_board_it_needs_numpy_and_onnxruntime_alone(slip_files):
     assert not loaded & {"scipy", "onnx", "jinja2", "matplotlib", "pyarrow", "torch", "training"}
 
 
-class Row(ctypes.Structure):
-    """`rover_row` of the C file."""
-
-    _fields_ = [
-        *((name, ctypes.c_float * 4) for name in ("rim_speed", "torque", "load")),
-        ("slope", ctypes.c_float),
-        ("elapsed", ctypes.c_float),
-    ]
-
-
-class Answer(ctypes.Structure):
-    """`rover_estimate` of the C file."""
-
-    _fields_ = [
-        ("speed", ctypes.c_float),
-        ("speed_std", ctypes.c_float),
-        ("speeds", ctypes.c_float * 3),
-        ("slips", ctypes.c_float * 12),
-        ("no_soil", ctypes.c_float),
-        ("beyond", ctypes.c_float),
-        ("flags", ctypes.c_int),
-    ]
-
-
 @pytest.mark.slow
-def test_c_computes_the_numbers_of_the_graph(slip_files, slip_drive, slip_stream):
-    strict = "-std=c99 -Wall -Wextra -Wconversion -pedantic -Wfloat-equal -Werror"
-    words = ["gcc", *strict.split(), "-O2", "-shared", "-fPIC", "rover.c", "-lm", "-o", "rover.so"]
-    subprocess.run(words, cwd=slip_files, check=True)
-    library = ctypes.CDLL(str(slip_files / "rover.so"))
-    sizes = dict(
-        line.split()[1:]
-        for line in (slip_files / "rover.h").read_text().splitlines()
-        if "_BYTES" in line
-    )
-    c_state = ctypes.create_string_buffer(int(sizes["ROVER_STATE_BYTES"]))
-    work = ctypes.create_string_buffer(int(sizes["ROVER_WORK_BYTES"]) + 64)
-    library.rover_start(c_state)
-    state = slip_stream.start()
-    begun = np.frombuffer(c_state, np.float32)
+def test_c_computes_the_numbers_of_the_graph(slip_in_c, slip_drive, slip_stream):
+    own, state = DrivenInC(slip_in_c), slip_stream.start()
+    begun = np.frombuffer(own.state, np.float32)
     assert np.array_equal(begun[: state.grounds.size].reshape(state.grounds.shape), state.grounds)
     for i in range(len(slip_drive.time)):
-        other, state = slip_stream.step(
-            state,
-            slip_drive.rim_speed[i],
-            slip_drive.torque[i],
-            slip_drive.load[i],
-            float(slip_drive.slope[i]),
-        )
-        row, answer = Row(slope=slip_drive.slope[i], elapsed=1.0), Answer()
-        row.rim_speed[:], row.torque[:] = slip_drive.rim_speed[i], slip_drive.torque[i]
-        row.load[:] = slip_drive.load[i]
-        code = library.rover_step(c_state, ctypes.byref(row), ctypes.byref(answer), work)
+        row = slip_row(slip_drive, i)
+        other, state = slip_stream.step(state, **row)
+        code, answer = own.step(row)
         assert code == (0 if other.answered else 1)
         assert answer.flags == sum(1 << FLAGS.index(name) for name in other.flags)
         assert answer.speed == pytest.approx(other.speed, abs=2e-3 * other.speed_std)
         assert answer.speed_std == pytest.approx(other.speed_std, rel=2e-3)
         assert list(answer.speeds) == pytest.approx(other.speeds, abs=0.02 * other.speed_std)
-        assert list(answer.slips) == pytest.approx(other.slips.ravel(), abs=2e-2)
-    row = Row(slope=np.nan, elapsed=1.0)
-    before = bytes(c_state)
-    assert library.rover_step(c_state, ctypes.byref(row), ctypes.byref(answer), work) == -1
-    assert bytes(c_state) == before
+        assert np.ravel(answer.slips) == pytest.approx(other.slips.ravel(), abs=2e-2)
+    before = bytes(own.state)
+    assert own.step(row | {"slope": np.nan})[0] == -1
+    assert bytes(own.state) == before
+    library = slip_in_c.library
     library.rover_identity.restype = library.rover_message.restype = ctypes.c_char_p
     told = library.rover_identity().decode()
     assert all(
@@ -170,4 +122,4 @@ def test_c_computes_the_numbers_of_the_graph(slip_files, slip_drive, slip_stream
     )
     texts = {library.rover_message(code) for code in (0, 1, -1, -2, -3)}
     assert len(texts) == 5 and library.rover_message(7) == b"unknown code"
-    assert int(sizes["ROVER_WORK_BYTES"]) < 300_000  # of 512 grounds; once 570 kB
+    assert slip_in_c.numbers["ROVER_WORK_BYTES"] < 300_000  # of 512 grounds; once 570 kB

@@ -33,11 +33,6 @@ def sealed(arrays):
     return arrays | {CHECKSUM: np.asarray(checksum_of(arrays))}
 
 
-@pytest.fixture(scope="module")
-def estimator(wheel_set_file):
-    return Estimator.load(wheel_set_file)
-
-
 def rows_of(posterior, count, seed=0, x=(0.2, -0.3, 0.1)):
     run, _ = simulated_run(posterior, count, seed, x)
     return [{name: float(values[i]) for name, values in run.items()} for i in range(count)]
@@ -48,37 +43,37 @@ def driven(tracker, rows):
 
 
 @pytest.fixture(scope="module")
-def after_40_rows(estimator, wheel_posterior):
+def after_40_rows(wheel_sets, wheel_posterior):
     """The state of a tracker after 40 rows of one soil."""
-    tracker = SoilTracker(estimator)
+    tracker = SoilTracker(wheel_sets)
     states = driven(tracker, rows_of(wheel_posterior, 40))
     assert {state.event for state in states} == {Event.ACCEPTED}
     return tracker.save()
 
 
 @pytest.fixture
-def settled(estimator, after_40_rows):
+def settled(wheel_sets, after_40_rows):
     """A tracker after 40 rows of one soil."""
-    return SoilTracker.restore(estimator, after_40_rows)
+    return SoilTracker.restore(wheel_sets, after_40_rows)
 
 
-def test_sound_rows_give_the_estimate_of_a_run(settled, estimator, wheel_posterior):
+def test_sound_rows_give_the_estimate_of_a_run(settled, wheel_sets, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 40)
-    exact = estimator.on(model_error=0.0)
+    exact = wheel_sets.on(model_error=0.0)
     tracker, together = SoilTracker(exact), exact.run(**run)
     driven(tracker, rows_of(wheel_posterior, 40))
     assert tracker.state.estimate.mean == pytest.approx(together.mean, rel=0.02)
     assert tracker.state.estimate.std == pytest.approx(together.std, rel=0.1)
     # errors of the model are linear at the soil that is known when a row arrives: of 120 sets of
     # the released wheel, nine in ten have 0.6 to 1.25 of the width, and both cover alike
-    found, together = settled.state.estimate, estimator.run(**run)
+    found, together = settled.state.estimate, wheel_sets.run(**run)
     assert (np.abs(found.mean - together.mean) < 0.6 * together.std).all()
     assert found.std == pytest.approx(together.std, rel=0.4)
     assert (settled.state.rows_remembered, settled.state.rows_since_change) == (40, 40)
 
 
-def test_errors_of_rows_are_linear_at_the_present_soil(estimator):
-    noisy, apart = estimator.on(noise={"slip": (SLIP_STD, 0.0)}), []
+def test_errors_of_rows_are_linear_at_the_present_soil(wheel_sets):
+    noisy, apart = wheel_sets.on(noise={"slip": (SLIP_STD, 0.0)}), []
     for seed in range(8):
         day = simulate_day(seed, usual_errors=1.0)
         tracker, memory = SoilTracker(noisy), noisy.start()
@@ -129,9 +124,9 @@ def test_a_stuck_torque_is_told_and_sound_rows_are_used_again(settled, wheel_pos
     assert {state.event for state in driven(settled, rows[10:])} == {Event.ACCEPTED}
 
 
-def test_a_stuck_slip_is_told_where_slip_has_noise(estimator, wheel_posterior):
+def test_a_stuck_slip_is_told_where_slip_has_noise(wheel_sets, wheel_posterior):
     rows = rows_of(wheel_posterior, 60)
-    noisy, exact = SoilTracker(estimator.on(noise={"slip": (0.02, 0.0)})), SoilTracker(estimator)
+    noisy, exact = SoilTracker(wheel_sets.on(noise={"slip": (0.02, 0.0)})), SoilTracker(wheel_sets)
     driven(noisy, rows[:40])
     slip = rows[39]["slip"]
     stuck = [noisy.read(**row | {"slip": slip}) for row in rows[40:55]]
@@ -140,9 +135,9 @@ def test_a_stuck_slip_is_told_where_slip_has_noise(estimator, wheel_posterior):
     assert Event.STUCK not in {exact.read(**row | {"slip": slip}).event for row in rows[:9]}
 
 
-def test_a_constant_load_with_declared_noise_is_not_stuck(estimator, wheel_posterior):
+def test_a_constant_load_with_declared_noise_is_not_stuck(wheel_sets, wheel_posterior):
     """Two rows were used, and none after them."""
-    noisy = estimator.on(noise={"slip": (0.02, 0.0), "load": (0.5, 0.01)})
+    noisy = wheel_sets.on(noise={"slip": (0.02, 0.0), "load": (0.5, 0.01)})
     tracker, rows = SoilTracker(noisy), rows_of(wheel_posterior, 40)
     ratio = [60.0 / row["load"] for row in rows]  # a wheel of another load has such a torque
     rows = [
@@ -158,11 +153,11 @@ def test_a_constant_load_with_declared_noise_is_not_stuck(estimator, wheel_poste
     assert again.read(**rows[0] | {"slip": 0.3}).event is not Event.STUCK
 
 
-def test_noise_above_that_stated_widens_the_estimate_up_to_a_limit(estimator, wheel_posterior):
+def test_noise_above_that_stated_widens_the_estimate_up_to_a_limit(wheel_sets, wheel_posterior):
     rng, rows = np.random.default_rng(0), rows_of(wheel_posterior, 60)
     widths = {}
     for times in (1.0, 1.6, 4.0):
-        tracker = SoilTracker(estimator)
+        tracker = SoilTracker(wheel_sets)
         more = 0.02 * np.sqrt(times**2 - 1.0) * rng.standard_normal(len(rows))
         noisy = [
             row | {"torque": row["torque"] * (1.0 + part)}
@@ -186,7 +181,7 @@ def test_the_same_row_again_counts_once(settled, wheel_posterior):
     assert again[-1].rows_remembered == count
 
 
-def test_what_is_wrong_in_a_program_raises_an_error(settled, estimator):
+def test_what_is_wrong_in_a_program_raises_an_error(settled, wheel_sets):
     with pytest.raises(InputError, match="load is missing; a row needs slip, torque, load"):
         settled.read(slip=0.3, torque=2.0)
     with pytest.raises(InputError, match="'speed' is not read by this model"):
@@ -194,16 +189,16 @@ def test_what_is_wrong_in_a_program_raises_an_error(settled, estimator):
     with pytest.raises(InputError, match="torque has 2 elements; needed is one number"):
         settled.read(slip=0.3, torque=[2.0, 2.1], load=60.0)
     with pytest.raises(InputError, match="length is 5; needed is a whole number of 16 or more"):
-        SoilTracker(estimator, length=5)
+        SoilTracker(wheel_sets, length=5)
     with pytest.raises(InputError, match="length is 15;"):
-        SoilTracker(estimator, length=15)
-    assert SoilTracker(estimator, length=16).length == 16
+        SoilTracker(wheel_sets, length=15)
+    assert SoilTracker(wheel_sets, length=16).length == 16
     with pytest.raises(InputError, match=r"wheel_linear\.onnx has no set posterior"):
         SoilTracker(Estimator.load("wheel_linear")).read(slip=0.3, torque=2.0, load=60.0)
 
 
-def test_what_is_remembered_does_not_grow(estimator, wheel_posterior):
-    tracker = SoilTracker(estimator, length=32)
+def test_what_is_remembered_does_not_grow(wheel_sets, wheel_posterior):
+    tracker = SoilTracker(wheel_sets, length=32)
     rows = rows_of(wheel_posterior, 90)
     sizes, remembered = [], []
     for row in rows:
@@ -214,31 +209,31 @@ def test_what_is_remembered_does_not_grow(estimator, wheel_posterior):
     assert 32 <= min(remembered[40:]) <= max(remembered) <= 34 and state.rows_since_change == 90
 
 
-def test_a_stored_state_continues_where_it_stopped(settled, estimator, wheel_posterior, tmp_path):
+def test_a_stored_state_continues_where_it_stopped(settled, wheel_sets, wheel_posterior, tmp_path):
     rows = rows_of(wheel_posterior, 30, seed=7, x=(-0.5, 0.6, -0.4))
     driven(settled, rows[:2])
     assert settled.state.rows_in_question > 0
     np.savez(tmp_path / "state.npz", **settled.save())
     with np.load(tmp_path / "state.npz", allow_pickle=False) as arrays:
-        other = SoilTracker.restore(estimator, arrays)
+        other = SoilTracker.restore(wheel_sets, arrays)
     for row in rows[2:]:
         ours, theirs = settled.read(**row), other.read(**row)
         assert ours.event is theirs.event and ours.words == theirs.words
         assert theirs.estimate.mean == pytest.approx(ours.estimate.mean, rel=1e-3)
 
 
-def test_a_state_of_another_file_or_a_damaged_one_is_refused(settled, estimator):
+def test_a_state_of_another_file_or_a_damaged_one_is_refused(settled, wheel_sets):
     arrays = settled.save()
-    other = replace(estimator, metadata=estimator.metadata | {"graph_sha256": "0" * 64})
+    other = replace(wheel_sets, metadata=wheel_sets.metadata | {"graph_sha256": "0" * 64})
     with pytest.raises(InputError, match="which is another file, wheel, prior"):
         SoilTracker.restore(other, arrays)
     for name in arrays:
         with pytest.raises(InputError, match="this state of a tracker is damaged"):
-            SoilTracker.restore(estimator, {k: v for k, v in arrays.items() if k != name})
+            SoilTracker.restore(wheel_sets, {k: v for k, v in arrays.items() if k != name})
     with pytest.raises(InputError, match="its checksum does not match"):
-        SoilTracker.restore(estimator, arrays | {"system": arrays["system"][:-1]})
+        SoilTracker.restore(wheel_sets, arrays | {"system": arrays["system"][:-1]})
     with pytest.raises(InputError, match="its system has shape"):
-        SoilTracker.restore(estimator, sealed(arrays | {"system": arrays["system"][:-1]}))
+        SoilTracker.restore(wheel_sets, sealed(arrays | {"system": arrays["system"][:-1]}))
     for name, value in (
         ("format", np.inf),
         ("numbers", np.ma.array([1], mask=[1])),
@@ -248,14 +243,14 @@ def test_a_state_of_another_file_or_a_damaged_one_is_refused(settled, estimator)
     ):
         for bad in (arrays | {name: value}, sealed(arrays | {name: value})):
             with pytest.raises(InputError, match="this state of a tracker is damaged"):
-                SoilTracker.restore(estimator, bad)
+                SoilTracker.restore(wheel_sets, bad)
     with pytest.raises(InputError, match="has format 0"):
-        SoilTracker.restore(estimator, arrays | {"format": np.asarray(0)})
+        SoilTracker.restore(wheel_sets, arrays | {"format": np.asarray(0)})
     with pytest.raises(InputError, match="give the length that it was made with"):
-        SoilTracker.restore(estimator, arrays, length=1000)
+        SoilTracker.restore(wheel_sets, arrays, length=1000)
 
 
-def test_a_state_file_is_written_whole_and_bounded_before_it_is_read(settled, estimator, tmp_path):
+def test_a_state_file_is_written_whole_and_bounded_before_it_is_read(settled, wheel_sets, tmp_path):
     """A small file whose content is large once took its memory before it was refused."""
     path = tmp_path / "state.npz"
     write_state(path, settled.save())
@@ -264,7 +259,7 @@ def test_a_state_file_is_written_whole_and_bounded_before_it_is_read(settled, es
     with pytest.raises(OSError, match="lost"):
         write_state(path, settled.save() | {"system": Lost()})
     assert path.read_bytes() == before
-    assert SoilTracker.restore(estimator, read_state(path)).state.rows_remembered == 40
+    assert SoilTracker.restore(wheel_sets, read_state(path)).state.rows_remembered == 40
     with zipfile.ZipFile(tmp_path / "large.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as out:
         out.writestr("system.npy", bytes(64 << 20))
     tracemalloc.start()
@@ -290,9 +285,9 @@ def test_restart_forgets_the_soil(settled):
 
 
 @pytest.mark.parametrize("drift", ["friction", pytest.param("zero", marks=pytest.mark.long)])
-def test_a_simulated_day(estimator, drift):
+def test_a_simulated_day(wheel_sets, drift):
     day = simulate_day(7, drift)
-    configured = estimator.on(noise={"slip": (SLIP_STD, 0.0)})
+    configured = wheel_sets.on(noise={"slip": (SLIP_STD, 0.0)})
     tracker, memory, plain = SoilTracker(configured), configured.start(), []
     states = []
     for i in range(len(day.kinds)):
