@@ -82,7 +82,8 @@ def test_the_board_estimates_as_the_ground_does(board, tmp_path, small_model):
     from soilml import Estimator
 
     (tmp_path / "runs.csv").write_text(RUNS)
-    done = run(board / "soilml", "estimate", str(small_model), "runs.csv", cwd=tmp_path)
+    words = ("estimate", str(small_model), "runs.csv", "--format", "csv")
+    done = run(board / "soilml", *words, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     rows = [line.split(",") for line in done.stdout.splitlines()]
     column = rows[0].index("cohesion_Pa")
@@ -97,9 +98,8 @@ def test_the_board_simulates_and_says_what_it_lacks(board, tmp_path):
 
     (tmp_path / "m.toml").write_text(MODEL)
     (tmp_path / "runs.csv").write_text(RUNS)
-    done = run(
-        board / "soilml", "simulate", "m.toml", "--slip", "0.3", "--load", "60", cwd=tmp_path
-    )
+    words = ("simulate", "m.toml", "--slip", "0.3", "--load", "60", "--format", "csv")
+    done = run(board / "soilml", *words, cwd=tmp_path)
     assert done.returncode == 0 and done.stdout.count("\n") == 2
     for command in (
         ["identify", "m.toml", "runs.csv"],
