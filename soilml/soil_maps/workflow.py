@@ -33,6 +33,7 @@ from soilml.soil_maps.local_soils import (
     with_exact_sensors,
 )
 from soilml.soil_maps.raster import Elevation, MapGrid
+from soilml.traction.rover_performance import rover_for
 
 if TYPE_CHECKING:
     from soilml.report.report import Report
@@ -220,6 +221,9 @@ def soil_map(
         )
     if case.gears:
         raise InputError("the model file has several gears; a map is of the wheels of one: --gear")
+    asked = np.asarray(slopes, dtype=np.float64)
+    if case.rover is not None:
+        rover_for(case, asked)
     own = Estimator.load(MODEL) if estimator is None else estimator
     if own.sets is None:
         raise InputError(f"{own.path} has no set posterior; train it with [set_posterior]")
@@ -249,7 +253,6 @@ def soil_map(
     mean, covariance = field.at(centres)
     ability = pitch = by_heading = None
     if case.rover is not None:
-        asked = np.asarray(slopes, dtype=np.float64)
         ability = map_ability(case, soils, mean, covariance, asked)
         if elevation is not None:
             pitch = _pitches(case, elevation, centres)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.config.wheeled_rover import WheeledRover
 from soilml.errors import InputError
 from soilml.fitting.mixtures import without_faults
 from soilml.fitting.operating_points import wheel_gears, wheel_passes
@@ -123,6 +124,16 @@ class RoverPerformance:
         return np.asarray(np.mean(self.margin >= 0.0, axis=0))
 
 
+def rover_for(case: Case, slopes: Floats) -> WheeledRover:
+    """The rover of a case; `InputError` without one, or for slopes (rad) out of its bounds."""
+    if case.rover is None:
+        raise InputError("the model file has no [rover]")
+    if not np.all((slopes >= 0.0) & (slopes <= LARGEST_SLOPE)):
+        raise InputError("slopes of a rover must lie between 0 and 60 degrees")
+    case.rover.loads(slopes)  # which no wheel may leave the ground under
+    return case.rover
+
+
 def on_slopes(
     case: Case, draws: SoilDraws, slopes: Floats, slip: Floats, speed: float | None = None
 ) -> tuple[Floats, dict[str, Floats]]:
@@ -131,11 +142,7 @@ def on_slopes(
     With the slips between which is interpolated: those given, and some below the first. Takes what
     `rover_performance` takes, and raises as it does.
     """
-    rover = case.rover
-    if rover is None:
-        raise InputError("the model file has no [rover]")
-    if not np.all((slopes >= 0.0) & (slopes <= LARGEST_SLOPE)):
-        raise InputError("slopes of a rover must lie between 0 and 60 degrees")
+    rover = rover_for(case, slopes)
     slip = np.concatenate([np.asarray(FIRST_SHARES) * slip[0], slip])
     on_slope = []
     for slope in slopes:

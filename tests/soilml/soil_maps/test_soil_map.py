@@ -218,6 +218,10 @@ def test_other_bad_input_is_one_line(rover, estimator, tmp_path, dem):
         for sizes in ({"cell": size}, {"reach": size}):
             with pytest.raises(InputError, match=r"needed are 0.01 to 1000 m"):
                 soil_map(case, two_soils(), estimator, **sizes)
+    asked = []
+    with pytest.raises(InputError, match="between 0 and 60 degrees"):
+        soil_map(case, two_soils(), estimator, slopes=[1.66], progress=lambda *at: asked.append(at))
+    assert not asked
     with pytest.raises(InputError, match="no cell of 100 m has its middle within 2 m"):
         soil_map(case, two_soils(60), estimator, cell=100.0)
     with pytest.raises(InputError, match="has no set posterior"):
