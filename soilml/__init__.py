@@ -40,6 +40,7 @@ _HOME = {
     "EFFECTS": "soilml.physics.effects",
     "Effect": "soilml.physics.effects",
     "EffectCard": "soilml.physics.effects",
+    "effect": "soilml.physics.effects",
     "GEARS": "soilml.physics.gears",
     "LinearWheel": "soilml.physics.gears",
     "Midstance": "soilml.physics.gears",

@@ -139,7 +139,7 @@ def _doubt(posterior: Posterior, node: Explanation, gain: float) -> Remark | Non
     if not gain > 0.0:
         return _reason("not-predictive", names)
     amplitude = posterior.terms.amplitude(node.at)
-    if amplitude.max(initial=0.0) >= constants.TOO_LARGE:
+    if amplitude.max(initial=0.0) >= constants.LARGE_REMAINDER:
         left = posterior.terms.readings.channels[int(np.argmax(amplitude))]
         text = f"beside {' + '.join(names)}, at least four times the usual error of a model is left"
         text += f" in the {left.replace('_', ' ')}"
@@ -166,7 +166,7 @@ def implausible_faults(fit: Solution) -> tuple[str, ...]:
     return tuple(
         c.effect
         for c, d in zip(fit.coordinates, deviation, strict=True)
-        if c.effect and not c.is_shape and d > constants.TOO_LARGE
+        if c.effect and not c.is_shape and d > constants.MAX_SIZE_DEVIATION
     )
 
 

@@ -147,7 +147,6 @@ def _suspects(found: GapReport) -> ReportTable:
     columns = [
         Column("effects", [" + ".join(s.effects) for s in shown]),
         Column("probability", [s.probability for s in shown], digits=2),
-        Column("ln(odds)", [s.log_odds for s in shown], digits=3),
         Column("ln(density kept back)", gains, digits=3),
     ]
     if any(s.times_usual for s in shown):

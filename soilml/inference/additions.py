@@ -30,7 +30,7 @@ def additions(
     model = linear_model(search.terms, node.fit, node.outliers, extra)
     start = node.fit.start_values()
     found: dict[Hypothesis, Prediction] = {}
-    prior = constants.EVEN_PRIOR
+    prior = constants.DISCREPANCY_PRIOR
     for at in ladder:
         try:
             products, constant = model.reduced(at)

@@ -17,11 +17,13 @@ EXPECTED_CAUSES = 1.0
 MOST_EFFECTS = 3
 #: Prior probability that the soil lies outside the priors that the case states: one in twenty.
 OUTSIDE_PRIORS = 0.05
-#: Prior probability that a smooth discrepancy is present, and that an effect follows another law
-#: than the catalogue's: published laws of one mechanism differ as often as not. With 0.9 for the
-#: discrepancy of `identify`, and distances from its mean times 1.2, 90 % intervals of 93 sets of
-#: `wrong_worlds` (seed 7101) covered 95 % and had worse scores; so they cover 93 %.
-EVEN_PRIOR = 0.5
+#: Prior probability that an effect follows another law than the catalogue's: published laws of
+#: one mechanism differ from each other as often as not.
+OTHER_LAW_PRIOR = 0.5
+#: Prior probability that a smooth discrepancy is present. With 0.9 for the soil of `identify`, and
+#: distances from its mean times 1.2, 90 % intervals of 93 sets of `wrong_worlds` (seed 7101)
+#: covered 95 % and had worse scores; so they cover 93 %.
+DISCREPANCY_PRIOR = 0.5
 #: Range over which the logarithm of the size of an effect of soil or gear is uniform, in reference
 #: sizes; the density falls with two further powers beyond it.
 SMALLEST_SIZE, LARGEST_SIZE, TAIL_POWER = 0.01, 5.0, 2.0
@@ -68,8 +70,10 @@ TRUSTED = 4.0
 #: reading, from which a fit is repeated: a hysteresis, so that the search ends.
 WORTH_A_FIT = 0.5
 #: Fits of one round, of which the first has half as many single effects in any case; rounds; and
-#: fits of an explanation in turn with its hyperparameters, or explanations that are extended.
-FITS, ROUNDS, IN_TURN = 8, 7, 6
+#: fits of an explanation in turn with its hyperparameters.
+FITS, ROUNDS, FITS_IN_TURN = 8, 7, 6
+#: Nodes from which additions are predicted, the likeliest first.
+EXTENDED = 6
 #: Size from which the fit of an effect starts, in reference sizes: off zero, where the derivative
 #: of some effects vanishes.
 START_SIZE = 0.7
@@ -112,10 +116,12 @@ NAMED_PROBABILITY = 0.9
 UNCERTAIN, CHANCE = 0.2, 0.05
 #: Odds against the likeliest set below which another one is rejected.
 REJECTED = 0.03
-#: Amplitude of a remaining discrepancy, in usual ones, beside which nothing is named (8 % of a
-#: range), and size of a fault of sensor or rig, in prior standard deviations, above which it
-#: explains nothing (a gain error of 24 % without calibration).
-TOO_LARGE = 4.0
+#: Amplitude of a remaining discrepancy, in usual ones, beside which nothing is named: 8 % of a
+#: range.
+LARGE_REMAINDER = 4.0
+#: Size of a sensor's or the rig's fault, in prior standard deviations, above which it explains
+#: nothing: a gain error of 24 % without calibration.
+MAX_SIZE_DEVIATION = 4.0
 #: Difference of the predictions of two laws, as a fraction of a channel's range, below which the
 #: law does not matter: that of a usual model error.
 NEGLIGIBLE_FRACTION = 0.02

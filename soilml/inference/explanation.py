@@ -54,7 +54,7 @@ class Explanation:
     @property
     def share_without(self) -> float:
         """Probability that there is no discrepancy, given the hypothesis."""
-        prior = constants.EVEN_PRIOR
+        prior = constants.DISCREPANCY_PRIOR
         logs = np.log([1.0 - prior, prior])
         logs = logs - 0.5 * np.asarray([self.without.trusted, self.beside.trusted])
         return float(np.exp(logs[0] - np.logaddexp(*logs)))

@@ -153,7 +153,7 @@ class InferenceProblem:
         outside = constants.OUTSIDE_PRIORS
         value -= 2.0 * float(np.log(outside if hypothesis.wide_priors else 1.0 - outside))
         if any(shape_coordinates(self.effects[name]) for name in hypothesis.effects):
-            other = constants.EVEN_PRIOR
+            other = constants.OTHER_LAW_PRIOR
             value -= 2.0 * float(np.log(other if hypothesis.free_law else 1.0 - other))
         return value
 

@@ -246,7 +246,7 @@ class Search:
             linear.evidence(linear.best(replace(start, present=present)))
             for start, present in zip(starts, (True, False), strict=True)
         )
-        prior = constants.EVEN_PRIOR
+        prior = constants.DISCREPANCY_PRIOR
         node = Explanation(hypothesis, fit, linear, beside, without, 0.0, outliers)
         log = np.logaddexp(
             np.log(prior) - 0.5 * beside.trusted, np.log(1.0 - prior) - 0.5 * without.trusted
@@ -262,7 +262,7 @@ class Search:
         lowest: The value of the best node so far.
         """
         found: dict[Hypothesis, Explanation] = {}
-        for turn in range(constants.IN_TURN):
+        for turn in range(constants.FITS_IN_TURN):
             again = []
             fits = self.fit(jobs, COARSE if turn == 0 else FINE)
             for job, fit in zip(jobs, fits, strict=True):
@@ -321,7 +321,7 @@ class Search:
         """The fits of the next round; in the first one the best single effects in any case."""
         lowest = self.lowest
         near = sorted(self.nodes.values(), key=lambda node: node.value)
-        near = [node for node in near if node.value < lowest + constants.NEAR][: constants.IN_TURN]
+        near = [node for node in near if node.value < lowest + constants.NEAR][: constants.EXTENDED]
         for node in {id(n): n for n in (*near, self.nodes[SOIL_ALONE])}.values():
             if node.extended:
                 continue

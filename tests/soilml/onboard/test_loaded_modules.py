@@ -20,7 +20,7 @@ def test_the_runtime_loads_numpy_and_onnxruntime_only(small_model, tmp_path):
     assert {"numpy", "onnxruntime"} <= loaded
     for ground in ("scipy", "sklearn", "torch", "pandas", "pyarrow", "matplotlib", "onnx"):
         assert ground not in loaded
-    for ground in ("datagen", "training", "argparse_completions"):
+    for ground in ("datagen", "training"):
         assert ground not in loaded
     rooms = {".".join(name.split(".")[:2]) for name in own}
     assert rooms == {"soilml.errors", "soilml.onboard", "soilml.quantities", "soilml.results"}
