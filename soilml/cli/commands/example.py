@@ -290,23 +290,21 @@ def _wheel_leg() -> tuple[str]:
 
     from soilml.io.text_tables import csv_text
     from soilml.systems.wheel_legs.stride_relations import (
-        LINEAR,
         S_I,
         S_Z,
-        SIMPLIFIED,
-        SINKAGE,
-        TORQUE_SLIP,
-        VIBRATION_SLIP,
+        SINKAGE_ERRORS,
+        TORQUE,
+        VIBRATION,
     )
 
     rng, columns = np.random.default_rng(4), dict[str, list[Any]]()
-    relations = (TORQUE_SLIP["simplified"], VIBRATION_SLIP["linear"])
+    errors = (TORQUE.errors, VIBRATION.errors, SINKAGE_ERRORS)
     for k, name, angle in ((0, "SSC-1", 0.7381), (3, "ES-3", 0.6254)):
         slip, noise = np.linspace(0.1, 0.4, 12), rng.standard_normal((3, 12))
-        angles = [angle * (1.0 + 0.01 * e.friction[k]) for e in (SIMPLIFIED, LINEAR, SINKAGE)]
+        angles = [angle * (1.0 + 0.01 * own.friction[k]) for own in errors]
         read = []
-        for relation, phi, z in zip(relations, angles, noise, strict=False):
-            p, q, r, s = relation.single or (0.0, 0.0, 0.0, 0.0)
+        for relation, phi, z in zip((TORQUE, VIBRATION), angles, noise, strict=False):
+            (p, q), (r, s) = relation.at_none, relation.rate
             y = (phi - relation.to_soil[0, 0]) / relation.to_soil[0, 1]
             read.append((slip + 0.03 * z - p - y * r) / (q + y * s))
         sunk = (angles[2] - S_I) / S_Z * (1.0 + 0.05 * noise[2])
