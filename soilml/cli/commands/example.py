@@ -244,26 +244,21 @@ def _sensor_wheel() -> tuple[str, str, str]:
     import numpy as np
 
     from soilml.io.text_tables import csv_text
-    from soilml.systems.rim_stress import (
-        MohrCoulomb,
-        SensingWheel,
-        SteadyRun,
-        balanced_arc,
-        simulate_readings,
-    )
+    from soilml.physics.soils import soil
+    from soilml.systems.rim_stress import SensingWheel, SteadyRun, balanced_arc, simulate_readings
 
-    wheel, sand = SensingWheel(), MohrCoulomb(friction_angle=0.6632)
+    wheel, sand = SensingWheel(), soil("nagatani2009/toyoura_sand")
     rng, runs = np.random.default_rng(4), {}
     readings: dict[str, list[Any]] = {"run": [], "angle_rad": [], "sensor": [], "force_N": []}
     for k, (slip, slope) in enumerate(((0.11, 0), (0.18, 2), (0.29, 4), (0.39, 6))):
         at = SteadyRun(slip=slip, weight=28.92, slope=np.deg2rad(slope))
-        arc = balanced_arc(np.deg2rad(30.0), at, wheel, sand, shear_modulus=0.0072)
+        arc = balanced_arc(np.deg2rad(30.0), at, wheel, sand)
         found = simulate_readings(arc, wheel, turns=5, crown=0.3, lugs=(0.3, 0.3), seed=k)
-        near = np.abs(found.angle) < 1.0
-        columns = (found.angle.round(5), found.sensor.astype(int), found.force.round(4))
+        near = np.abs(found["angle_rad"]) < 1.0
         readings["run"] += [f"slope_{slope}"] * int(near.sum())
-        for name, values in zip(list(readings)[1:], columns, strict=True):
-            readings[name] += values[near].tolist()
+        for name, values in found.items():
+            digits = 4 if name == "force_N" else 5
+            readings[name] += values[near].round(digits).tolist()
         read = round(slip + 0.01 * (1.0 - slip) * float(rng.standard_normal()), 4)
         runs[f"slope_{slope}"] = (read, 0.01, 28.92, 0.3, round(float(at.slope), 5))
     names = ("slip", "slip_std", "load_N", "load_N_std", "slope_rad")
