@@ -148,7 +148,7 @@ def _weight(torque: str, vibration: str) -> float:
 
 
 def _slip_gain(torque: str, vibration: str, index: int) -> float:
-    single = (TORQUE_SLIP[torque], VIBRATION_SLIP[vibration])[index] ** 0.5
+    single = float((TORQUE_SLIP[torque], VIBRATION_SLIP[vibration])[index] ** 0.5)
     return float(fused_slip(torque, vibration).std) - 100.0 * single
 
 

@@ -131,10 +131,10 @@ def soil_of_strides(slip: Floats, readings: Mapping[str, Floats]) -> StrideSoil:
         weights = pairwise(mean, np.asarray([one.errors.scatter for one in each])).weights
         mean = np.vstack([mean, (weights * mean).sum(axis=0)])
         sensors, strides = (*sensors, "fused"), [*strides, max(strides)]
-    shared = sum(w[:, None] * one.deviations for w, one in zip(weights, each, strict=True))
-    covariance = shared @ shared.T + sum(
-        np.outer(w, w) * one.of_strides for w, one in zip(weights, each, strict=True)
-    )
+    pairs = list(zip(weights, each, strict=True))
+    shared = np.sum([w[:, None] * one.deviations for w, one in pairs], axis=0)
+    of_strides = np.sum([np.outer(w, w) * one.of_strides for w, one in pairs], axis=0)
+    covariance = shared @ shared.T + of_strides
     std = np.stack([*(one.std for one in each), np.sqrt(np.diag(covariance))])[: len(sensors)]
     return StrideSoil(sensors, mean, std, covariance, tuple(strides), tuple(unused))
 
