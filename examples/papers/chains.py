@@ -40,6 +40,7 @@ def run() -> None:
     for name in sys.argv[1:] or CHAINS:
         folder = OUT / name
         shutil.rmtree(folder, ignore_errors=True)
+        print()
         if main(["example", name, str(folder), "--quiet"]) != 0:
             raise SystemExit(2)
         words, truth = CHAINS[name]

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from soilml.papers.published import ORDINAL, PAPERS, STATUSES, Comparison, count_statuses
+from soilml.papers.published import ORDINAL, PAPERS, Comparison, count_statuses
 from soilml.report.report import Report
 from soilml.report.tables import Column, ReportTable
 
@@ -61,7 +61,7 @@ def _counts(found: Sequence[Comparison]) -> ReportTable:
     if len(counts) > 1:
         counts["all"] = sum(counts.values(), Counter())
     codes = list(next(iter(count_statuses(found).values())))
-    words = Column("status", ["all that are printed", *(STATUSES[code] for code in codes)])
+    words = Column("status", ["printed", *(code.replace("_", " ") for code in codes)])
     return ReportTable(
         "Numbers by status",
         [
