@@ -23,7 +23,7 @@ COMMANDS = _RENAMED | {
         ("show", "", "models soils effects"),
         ("setup", "", "completion"),
         ("drive", "", "slip map"),
-        ("export", "export-", "c fusion step slip soil"),
+        ("export", "export-", "c step slip soil"),
         ("paper", "", "climb sensor-wheel wheel-leg walk"),
     )
     for word in names.split()
