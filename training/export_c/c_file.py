@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
@@ -96,26 +96,22 @@ def write_c(
     single = single_function(model, shared, name) if interface.single else None
     sets = set_functions(model, interface, shared, rows, name) if interface.sets else None
     functions = [*([single] if single else []), *(sets.all if sets else [])]
-    arrays = {
-        name: (kind, max(f.lengths.get(kind, 0) for f in functions))
-        for kind, name in ARRAYS.items()
-        if any(kind in f.lengths for f in functions)
-    }
-    constants = shared.used_in("\n".join(function.text for function in functions))
-    constant_bytes = sum(v.size * BYTES[kind] for _, v, kind in constants)
-    memory = work = 0
+    memory = members = of_sampler = 0
     if sets:
         shared.kernel("tanh_of", "float")
-        arrays["floats"] = "float", max(arrays["floats"][1], shared_floats(sets.values))
         columns, real = interface.columns, BYTES[interface.precision]
-        constant_bytes += 4 * sum(np.size(x) for x in sets.values["arrays"].values())
-        work += 4 * sum(prod(sizes) for sizes in sets.members.values())
-        work += (4 * len(interface.rows) + 4) * rows + columns * real + 40
-        work += sum(BYTES[kind] * prod(shape) for kind, shape in sets.answer.outputs.values())
+        of_sampler = 4 * sum(np.size(x) for x in sets.values["arrays"].values())
+        members = 4 * sum(prod(sizes) for sizes in sets.members.values())
+        members += (4 * len(interface.rows) + 4) * rows + columns * real + 40
+        members += sum(BYTES[kind] * prod(shape) for kind, shape in sets.answer.outputs.values())
         memory = columns * (columns + 1) // 2 * real + (4 + len(interface.context)) * 4 + 24
-    work += sum(BYTES[kind] * length for kind, length in arrays.values())
-    memory, work = (-(-size // 8) * 8 for size in (memory, work))
-    sizes = {"memory_bytes": memory, "work_bytes": work, "constant_bytes": constant_bytes}
+        memory = -(-memory // 8) * 8
+    common = common_values(functions, shared, shared_floats(sets.values) if sets else 0)
+    sizes = {
+        "memory_bytes": memory,
+        "work_bytes": -(-(common["array_bytes"] + members) // 8) * 8,
+        "constant_bytes": common["constant_bytes"] + of_sampler,
+    }
     environment = template_environment()
     values = {
         "name": name,
@@ -129,13 +125,9 @@ def write_c(
         "noise": noise,
         "codes": CODES,
         "interface": interface,
-        "functions": functions,
         "single": single,
         "sets": sets,
         "sampler": sets.values if sets else {},
-        "arrays": arrays,
-        "constants": [array(*parts) for parts in constants],
-        "kernels": kernel_texts(shared),
         "rows": rows,
         "quantities": list(zip(fields["names"], fields["units"], strict=True)),
         "lower": fields["prior"].lower.tolist(),
@@ -146,12 +138,34 @@ def write_c(
         "exact_columns": interface.columns - len(MODEL_ERROR_COLUMNS),
         "least_share": fields["sets"].least_share_in_range if fields["sets"] else 0.0,
         "tracker": tracker_values(interface, noise, memory, length) if sets else None,
+        **common,
         **sizes,
     }
     source, header = (
         environment.get_template(f"{part}.j2").render(values) for part in ("source.c", "header.h")
     )
     return CFile(source, header, **sizes)
+
+
+def common_values(
+    functions: Sequence[Function], shared: SharedParts, least_floats: int = 0
+) -> dict[str, Any]:
+    """Values for the templates of any C file, and the bytes of working arrays and constants.
+
+    least_floats: Numbers of float that functions of the templates take of the working arrays.
+    """
+    lengths = {"float": least_floats} if least_floats else {}
+    for function in functions:
+        lengths |= {k: max(n, lengths.get(k, 0)) for k, n in function.lengths.items()}
+    constants = shared.used_in("\n".join(function.text for function in functions))
+    return {
+        "functions": functions,
+        "arrays": {ARRAYS[kind]: (kind, lengths[kind]) for kind in ARRAYS if kind in lengths},
+        "constants": [array(*parts) for parts in constants],
+        "kernels": kernel_texts(shared),
+        "array_bytes": sum(BYTES[kind] * length for kind, length in lengths.items()),
+        "constant_bytes": sum(v.size * BYTES[kind] for _, v, kind in constants),
+    }
 
 
 def template_environment() -> Any:

@@ -162,9 +162,11 @@ def set_functions(
         "answer_graph", inputs={**of_set, **total, **sample}, checked=True,
         outputs={output: estimate_place(output.removeprefix(SET_PREFIX)) for output in outputs},
     )  # fmt: skip
-    members = {m: (rows, prod(row.outputs[v][1])) for v, m in kept.items()}
-    members |= {m: (prod(once.outputs[v][1]),) for v, m in of_all.items()}
-    members |= _work_members(sizes, interface.columns, rows)
+    members: dict[str, tuple[int, ...]] = {
+        **{m: (rows, prod(row.outputs[v][1])) for v, m in kept.items()},
+        **{m: (prod(once.outputs[v][1]),) for v, m in of_all.items()},
+        **_work_members(sizes, interface.columns, rows),
+    }
     return SetFunctions(row, whole, once, at_soil, answer, row_columns, members, sizes)
 
 

@@ -87,8 +87,8 @@ def translate(
         for key, tensor in zip(node.output, made, strict=False):
             several = tensor.text and uses[key] > 1
             found[key] = program.stored(tensor) if several else tensor
-    made = {key: (found[key], place) for key, place in outputs.items()}
-    return Function.of(name, program, made, parameters, checked)
+    placed = {key: (found[key], place) for key, place in outputs.items()}
+    return Function.of(name, program, placed, parameters, checked)
 
 
 def _translated(program: Program, node: Any, inputs: list[Tensor | None]) -> list[Tensor]:

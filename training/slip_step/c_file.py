@@ -11,10 +11,10 @@ import numpy as np
 from soilml import __version__
 from soilml.onboard.slip_stream import FLAGS, POSSIBLE, QUANTILES, RECENT
 from soilml.slip_filter.filter import SlipFilter
-from training.export_c.c_file import BYTES, kernel_texts, template_environment
+from training.export_c.c_file import common_values, template_environment
 from training.export_c.c_text import array
 from training.export_c.interface import input_shapes
-from training.export_c.program import ARRAYS, SharedParts
+from training.export_c.program import SharedParts
 from training.export_c.tensor import Tensor
 from training.export_c.translation import flat_nodes, translate
 from training.slip_step.graph import start_of
@@ -65,9 +65,8 @@ def write_slip_c(
         "work": "WORK *work",
     }
     function = translate("step_graph", nodes, known, inputs, OUTPUTS, shared, parameters, True)
-    used = shared.used_in(function.text)
     start, _ = start_of(filter_)
-    arrays = {ARRAYS[kind]: (kind, length) for kind, length in function.lengths.items()}
+    common = common_values([function], shared)
     values = {
         "name": name,
         "NAME": name.upper(),
@@ -84,19 +83,15 @@ def write_slip_c(
         "codes": CODES,
         "flags": FLAGS,
         "function": function,
-        "functions": [function],
-        "arrays": arrays,
-        "constants": [array(*parts) for parts in used],
         "prior": array("prior", start[:, 0].astype(np.float32), "float"),
         "begin": start[0, 1:].tolist(),
-        "kernels": kernel_texts(shared),
         "identity": {key: metadata[key] for key in IDENTITY},
         "possible": POSSIBLE,
         "load": (float(filter_.table.load[0]), float(filter_.table.load[-1])),
-        "work_bytes": sum(BYTES[kind] * length for kind, length in arrays.values())
-        + 4 * (len(FLAGS) + 4 + len(QUANTILES)),
+        **common,
+        "work_bytes": common["array_bytes"] + 4 * (len(FLAGS) + 4 + len(QUANTILES)),
         "state_bytes": 4 * (start.size + RECENT + 2),
-        "constant_bytes": sum(v.size * BYTES[kind] for _, v, kind in used) + 4 * start.shape[0],
+        "constant_bytes": common["constant_bytes"] + 4 * start.shape[0],
     }
     environment = template_environment()
     environment.loader.searchpath.append(str(Path(__file__).parent))
