@@ -31,7 +31,9 @@ from soilml.systems.wheel_legs.stride_relations import (
     SINKAGE_ERRORS,
     STIFFNESS,
     TORQUE_ERRORS,
+    TORQUE_SLIP,
     VIBRATION_ERRORS,
+    VIBRATION_SLIP,
 )
 from soilml.systems.wheel_legs.strides import HEAVY_AT, HEAVY_WHEEL
 
@@ -51,9 +53,6 @@ STD = {
     name: tuple(one.scatter[k] for one in (TORQUE_ERRORS, VIBRATION_ERRORS, SINKAGE_ERRORS))
     for k, name in enumerate(("friction", "stiffness"))
 }
-#: Variances of the slip by relations of torque and of vibration, table VI.
-TORQUE_SLIP = {"terramechanics": 0.074, "empirical": 0.005, "simplified": 0.018}
-VIBRATION_SLIP = {"planar": 0.015, "linear": 0.020}
 K_A = {"ssc-1": 0.024, "ssc-2": 0.017, "ssc-3": 0.021, "es-3": 0.022}  # Table I
 SIGMA = np.asarray([ground.normal_stiffness for ground in GROUNDS.values()])  # Pa
 
@@ -116,7 +115,7 @@ def vibration_fit(planar: bool) -> Fit:
 
 def fused_slip(torque: str, vibration: str) -> FusedEstimate:
     """Fused slip from torque and vibration, with the standard deviations of table VI (in %)."""
-    std = 100.0 * np.asarray([TORQUE_SLIP[torque], VIBRATION_SLIP[vibration]]) ** 0.5
+    std = 100.0 * np.asarray([TORQUE_SLIP[torque].slip_std, VIBRATION_SLIP[vibration].slip_std])
     return inverse_variance(np.zeros(2), std)
 
 
@@ -133,8 +132,8 @@ def efficiency(name: str) -> float:
 
 def constant_intercept() -> float:
     """Mean intercept of the empirical model (table IV) over the four soils of table I."""
-    slope = (1.0 - np.asarray(four_soils().friction_angle)) / 0.58
-    return float(np.mean((SIGMA / PRESSURE + 0.7 - 20.928 * slope) / 15.997))
+    a, _ = TORQUE_SLIP["empirical"].line(np.asarray(four_soils().friction_angle), SIGMA)
+    return float(a.mean())
 
 
 def _coefficient(fit: Callable[[], Fit], part: str, index: int | None = None) -> float:
@@ -210,7 +209,7 @@ COMPUTED: dict[str, Callable[[], float]] = {
 
 def _of_slips(torque: str, vibration: str) -> dict[str, Callable[[], float]]:
     """Weight of torque, and the change of each standard deviation (%) by fusion of slips."""
-    alone = [100.0 * v**0.5 for v in (TORQUE_SLIP[torque], VIBRATION_SLIP[vibration])]
+    alone = [100.0 * r.slip_std for r in (TORQUE_SLIP[torque], VIBRATION_SLIP[vibration])]
     key = f"t6_{torque[0]}{vibration[0]}"
     return {
         f"{key}_weight": lambda: float(fused_slip(torque, vibration).weights[0]),
