@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
 from soilml import __version__
-from soilml.cli.old_spellings import present_words
 from soilml.cli.options import declare, declared_outputs, input_files, need_for_options
 from soilml.cli.process import (
     StopSignals,
@@ -100,11 +99,8 @@ GROUPS = {
     "plan": "what to measure or build next",
     "paper": "of the papers",
 }
-#: Options whose value may begin with a minus sign.
-_NEGATIVE_VALUES = ("--slip", "--load")
 _WRONG_COMMAND = re.compile(r"argument COMMAND: invalid choice: '(.*)' \(choose from (.*)\)")
 _UNKNOWN_OPTION = re.compile(r"unrecognized arguments: (?:[^-].*? )?(--?[\w-]+)")
-_NEGATIVE = re.compile(r"-[\d.]")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -114,6 +110,10 @@ class _Parser(argparse.ArgumentParser):
     """
 
     known: Sequence[str] = ()
+
+    def __init__(self, *words: Any, **options: Any) -> None:
+        super().__init__(*words, **options)
+        self._negative_number_matcher = re.compile(r"-[\d.]")  # -0.3:0.6:10 is a value
 
     def error(self, message: str) -> NoReturn:
         wrong = _WRONG_COMMAND.fullmatch(message)
@@ -269,10 +269,11 @@ def _run(arguments: Sequence[str] | None, signals: StopSignals) -> int:
 
 def _status(words: list[str]) -> int:
     """Run the command of these words; returns the exit status."""
-    typed = words or ["--help"]
-    words = _join_negative_values(present_words(typed))
+    words = words or ["--help"]
+    if empty := [word for word in words if word.startswith("--") and word.endswith("=--")]:
+        raise InputError(f"{empty[0]}: needed is a value after the equals sign")
     args = parser(words).parse_args(words)
-    args.command_line, args.make_parser = typed, parser
+    args.command_line, args.make_parser = words, parser
     SCREEN.choose(getattr(args, "format", None), args.quiet, args.verbose)
     check_outputs(args.outputs(args), input_files(args))
     check_memory_limit()
@@ -290,16 +291,3 @@ def _interrupted(stop: KeyboardInterrupt | Terminated) -> int:
     written = f"complete before that: {', '.join(replaced)}" if replaced else ""
     said = getattr(stop, "said", f"interrupted; {written or 'no output was written'}")
     return fail(said, int(code or 0))
-
-
-def _join_negative_values(words: list[str]) -> list[str]:
-    """`--slip -0.3:0.6:10` as one word, because argparse would read two options."""
-    joined: list[str] = []
-    for word in words:
-        if word.startswith("--") and word.endswith("=--"):  # argparse drops this value
-            raise InputError(f"{word}: needed is a value after the equals sign")
-        if joined and joined[-1] in _NEGATIVE_VALUES and _NEGATIVE.match(word):
-            joined[-1] += f"={word}"
-        else:
-            joined.append(word)
-    return joined

@@ -60,7 +60,7 @@ def test_errors_are_one_line_and_leave_nothing(tmp_path, capsys):
     missing = str(tmp_path / "none.onnx")
     refused([*words, "--against", missing], capsys, "none.onnx")
     (tmp_path / "soil.toml").write_text("[gear]\n")
-    refused([*words, "--soil", str(tmp_path / "soil.toml")], capsys, "[soil] is missing")
+    refused([*words, "--truth", str(tmp_path / "soil.toml")], capsys, "[soil] is missing")
     model = tmp_path / "model.toml"
     model.write_text(model.read_text().replace("[gear]", "[gears.one]"))
     refused(words, capsys, "several gears (one)")
@@ -92,7 +92,7 @@ def test_the_chain_from_a_hidden_effect_to_a_better_file(tmp_path, capsys, small
     loads = (60.0, 120.0, 200.0, 90.0, 150.0, 75.0)
     words = [*write_log(tmp_path, SlipSinkage(n1=0.5), loads=loads, priors=soft)]
     words += ["--out", str(out), "--rows", "2000", "--against", "wheel"]
-    words += ["--soil", str(tmp_path / "model.toml")]
+    words += ["--truth", str(tmp_path / "model.toml")]
     assert main(words) == 0
     shown = capsys.readouterr().out
     content = json.loads((out / "adapt.json").read_text())

@@ -14,7 +14,6 @@ TYPED = {
     "soilml identify m.toml --method p": "posterior",
     "soilml show soils wong1989/dry": "wong1989/dry_sand",
     "soilml show effects slip-s": "slip-scale slip-sinkage",
-    "soilml estimate wheel_l": "wheel_linear wheel_lssvm",
     "soilml pull m.toml r.csv --gravity m": "moon mars",
     "soilml setup completion f": "fish",
     "soilml identify mo": "model.toml",

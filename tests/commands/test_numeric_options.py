@@ -16,12 +16,7 @@ from soilml.cli.options import leaves
 HOSTILE = ["nan", "inf", "-inf", "0", "-1", "1e-9", "1e9", "-1e9", "1e400", "x", ""]
 #: Options whose text holds numbers, which their command reads.
 OF_TEXT = {
-    "init": [
-        "--radius",
-        "--width",
-        "--torque-noise",
-        *("--mass", "--wheelbase", "--track", "--height"),
-    ],
+    "init": ["--radius", "--width"],
     "simulate": ["--slip", "--load"],
     "plan next": ["--slip", "--load", "--gravity", "--tested-at", "--radius"],
     "pull": ["--load", "--slope", "--gravity", "--tested-at"],
@@ -71,8 +66,7 @@ def folder(tmp_path_factory):
 
 
 WORDS = {
-    "init": ["init", "new.toml", "--radius", "0.15", "--width", "0.12", "--soil",
-             "wong1989/dry_sand", "--mass", "12"],
+    "init": ["init", "new.toml", "--radius", "0.15", "--width", "0.12"],
     "simulate": ["simulate", "m.toml", "--slip", "0.2", "--load", "60"],
     "plan next": ["plan", "next", "m.toml", "r.csv", "--exact-model"],
     "pull": ["pull", "m.toml", "r.csv", "--load", "60", "--exact-model"],

@@ -21,7 +21,7 @@ WHEEL = {
 
 def exported(tmp_path, file, *options):
     out = tmp_path / "step.onnx"
-    assert main(["export-step", f"exported/{file}.onnx", str(out), *options]) == 0
+    assert main(["export", "step", f"exported/{file}.onnx", str(out), *options]) == 0
     return out
 
 

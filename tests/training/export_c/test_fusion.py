@@ -78,8 +78,8 @@ def slip(request, tmp_path_factory):
     names = [f"slip_torque{kind}", f"slip_vibration{kind}"]
     models = [str(ROOT / "exported" / f"{name}.onnx") for name in names]
     for name, model in zip(names, models, strict=True):
-        assert main(["export-c", model, str(folder / f"{name}.c")]) == 0
-    assert main(["export-fusion", *models, str(folder / "slip.c")]) == 0
+        assert main(["export", "c", model, str(folder / f"{name}.c")]) == 0
+    assert main(["export", "fusion", *models, str(folder / "slip.c")]) == 0
     library = build(folder, [f"{name}.c" for name in (*names, "slip")])
     parts = [CompiledModel(folder / f"{name}.h", library) for name in names]
     return (
@@ -200,7 +200,7 @@ def test_files_that_cannot_be_fused_are_refused_in_one_line(tmp_path, capsys):
         (["slip_torque"], "each needs another name"),
     ):
         models = [str(folder / f"{name}.onnx") for name in ("slip_torque", *others)]
-        assert main(["export-fusion", *models, str(tmp_path / "slip.c")]) == 2
+        assert main(["export", "fusion", *models, str(tmp_path / "slip.c")]) == 2
         error = capsys.readouterr().err
         assert said in error and error.count("\n") == 1
     assert not list(tmp_path.iterdir())

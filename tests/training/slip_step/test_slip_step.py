@@ -74,7 +74,7 @@ def test_wrong_input_is_one_line(slip_stream, slip_drive, tmp_path, capsys):
     with pytest.raises(ModelFileError, match="there is no such file"):
         SlipStream.load(tmp_path / "none.onnx")
     model = SLIP_EXAMPLE.parent / "wheel" / "model.toml"
-    assert main(["export-slip", str(model), str(tmp_path / "a.onnx")]) == 2
+    assert main(["export", "slip", str(model), str(tmp_path / "a.onnx")]) == 2
     assert "no [rover]" in capsys.readouterr().err and not (tmp_path / "a.onnx").exists()
 
 
