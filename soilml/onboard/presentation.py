@@ -113,8 +113,6 @@ def remarks_on(found: TableEstimates, estimators: Sequence[Estimator]) -> list[R
     first, table, by = estimators[0], found.table, found.by
     remarks = [] if by is None else _channel_remarks(first, table)
     remarks += _width_remarks(found)
-    if found.rule is not None:
-        remarks.append(Remark("fused", f"fused by the rule {found.rule}", severity="note"))
     remarks += _row_refusals(found) if by is None else _group_refusals(found)
     if by is None or first.sets is None:
         remarks += _unused_std_remarks(first, table)

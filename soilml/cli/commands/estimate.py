@@ -141,15 +141,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
     """Raise `InputError` for options that cannot be combined."""
-    from soilml.onboard import table_estimates
-    from soilml.onboard.joint_errors import are_comparable
-
     if args.runs is None and any((args.by, args.where, args.out, args.report)):
         raise InputError("RUNS.csv is missing: --by, --where, --out and --report are for its rows")
     if args.by is not None and args.with_:
         raise InputError("--with fuses single rows; omit --by")
-    if not are_comparable([e.errors for e in estimators]):
-        table_estimates.check_independent(estimators)
     if args.by is not None and estimators[0].per_row:
         raise InputError(
             f"{args.trained} estimates {estimators[0].per_row[0]}, which differs from row to row "
@@ -166,7 +161,7 @@ def _advice(found: TableEstimates) -> list[Remark]:
     from soilml.onboard import presentation, table_estimates
 
     place = presentation.typical(found)
-    if place is None or found.rule is not None:
+    if place is None or found.files is not None:
         return []
     if found.by is None:
         row = found.table.rows(np.asarray([place]))

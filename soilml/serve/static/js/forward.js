@@ -11,7 +11,7 @@ const FROM_FILE = "model-file";
 const CURVES = { torque: "N m", pull: "N", sinkage: "mm" };
 const OPEN = 2; // groups of sliders that are open at first
 
-const state = { model: "", modelName: "", sliders: new Map(), answer: null, kept: null };
+const state = { model: "", modelName: "", sliders: new Map() };
 const plots = {};
 let generation = 0, busy = false, again = false;
 
@@ -25,7 +25,7 @@ function chosen() {
 
 export async function startForward(choices) {
   state.choices = choices;
-  fillChoices(choices.first);
+  fillChoices({ wheel: choices.wheels[0].id, soil: choices.first });
   makePlots();
   byId("wheel").addEventListener("change", choose);
   byId("soil").addEventListener("change", choose);
@@ -33,7 +33,6 @@ export async function startForward(choices) {
     for (const slider of state.sliders.values()) slider.set(slider.first);
     update();
   });
-  byId("keep").addEventListener("click", keep);
   await loadControls();
 }
 
@@ -46,17 +45,14 @@ function fillChoices(first) {
 }
 
 function notes() {
-  for (const [id, list] of [["wheel", "wheels"], ["soil", "soils"]]) {
-    const entry = state.choices[list].find((e) => e.id === byId(id).value);
-    byId(`${id}-note`).textContent = entry ? entry.note : "as the model file has it";
-  }
+  const entry = state.choices.soils.find((e) => e.id === byId("soil").value);
+  byId("soil-note").textContent = entry ? entry.note : "as the model file has it";
 }
 
 async function choose() {
   if (state.model && (byId("wheel").value !== FROM_FILE || byId("soil").value !== FROM_FILE)) {
-    const { first } = state.choices;
-    const keep = (id) => (byId(id).value === FROM_FILE ? first[id] : byId(id).value);
-    const next = { wheel: keep("wheel"), soil: keep("soil") };
+    const chosenOr = (id, first) => (byId(id).value === FROM_FILE ? first : byId(id).value);
+    const next = { wheel: chosenOr("wheel", state.choices.wheels[0].id), soil: chosenOr("soil", state.choices.first) };
     state.model = "";
     fillChoices(next);
   }
@@ -98,7 +94,6 @@ async function loadControls() {
       element("summary", {}, title), ...made.map((slider) => slider.place));
   });
   byId("sliders").replaceChildren(...groups);
-  release();
   update();
   return true;
 }
@@ -132,10 +127,7 @@ function makePlots() {
   for (const [name, unit] of Object.entries(CURVES)) {
     plots[name] = new Plot(byId(`${name}-plot`), {
       x: "slip", y: null, reading: byId(`${name}-reading`),
-      series: [
-        { label: "", colour: name, unit, width: 2.5 },
-        { label: "kept", colour: "kept", unit, dash: [6, 5], width: 1.8 },
-      ],
+      series: [{ label: "", colour: name, unit, width: 2.5 }],
     });
   }
   plots.stress = new Plot(byId("stress-plot"), {
@@ -144,14 +136,11 @@ function makePlots() {
       { label: "σ", colour: "normal", unit: "kPa", width: 2.5 },
       { label: "τ", colour: "shear", unit: "kPa", width: 2.5 },
       { label: "strength", colour: "strength", unit: "kPa", dash: [6, 5], width: 1.8 },
-      { label: "kept σ", colour: "normal", dash: [2, 4], width: 1.4 },
-      { label: "kept τ", colour: "shear", dash: [2, 4], width: 1.4 },
     ],
   });
 }
 
 function draw(answer) {
-  state.answer = answer;
   showError("forward-error", answer.reason ? `Slip ${number(answer.at.slip)}, load ${withUnit(answer.at.load, "N")}: ${answer.reason}` : "");
   byId("now").replaceChildren(
     now("Torque", answer.at.torque, "N m"), now("Drawbar pull", answer.at.pull, "N"),
@@ -164,64 +153,19 @@ const now = (label, value, unit) => element("div", {}, element("dt", {}, label),
   element("dd", {}, number(value), element("small", {}, unit ? `\u00a0${unit}` : "")));
 
 function drawCurve(name, answer) {
-  const x = [...new Set([...answer.slip, ...(state.kept?.slip ?? [])])].sort((a, b) => a - b);
-  const line = (curve) => {
-    if (!curve) return x.map(() => null);
-    const known = new Map(curve.slip.map((s, i) => [s, curve[name][i]]));
-    return fill(x, known);
-  };
   const here = answer.at[name];
-  plots[name].set([x, line(answer), line(state.kept)],
-    [answer.at.slip, here, name],
+  plots[name].set([answer.slip, answer[name]], [answer.at.slip, here, name],
     `${name === "pull" ? "Drawbar pull" : name} against slip; ${withUnit(here, CURVES[name])} at slip ${number(answer.at.slip)}`);
 }
 
-/** A curve at the slips of all curves; linear between its own points. */
-function fill(x, known) {
-  const own = [...known.keys()].sort((a, b) => a - b);
-  let i = 0;
-  return x.map((s) => {
-    if (known.has(s)) return known.get(s);
-    if (s < own[0] || s > own.at(-1)) return null;
-    while (own[i + 1] < s) i += 1;
-    const [a, b] = [known.get(own[i]), known.get(own[i + 1])];
-    return a === null || b === null ? null : a + ((b - a) * (s - own[i])) / (own[i + 1] - own[i]);
-  });
-}
-
-function drawStress(answer) {
-  const { profile } = answer;
+function drawStress({ profile, ...answer }) {
   byId("stress-figure").hidden = !profile;
   if (!profile) return;
-  wheelPicture(byId("wheel-picture"), answer);
-  const kept = state.kept?.profile;
-  const back = (values) => [...values].reverse();
-  const mine = back(profile.angle);
-  const x = [...new Set([...mine, ...(kept ? kept.angle : [])])].sort((a, b) => a - b);
-  const line = (from, name) => (from ? fill(x, new Map(from.angle.map((a, i) => [a, from[name][i]]))) : x.map(() => null));
-  plots.stress.set([x, line(profile, "normal"), line(profile, "shear"), line(profile, "strength"),
-    line(kept, "normal"), line(kept, "shear")], null,
-  `Stress against angle: normal stress up to ${number(Math.max(...profile.normal))} kPa, shear stress up to ${number(Math.max(...profile.shear))} kPa, entry at ${number(profile.angle[0])} degrees`);
+  wheelPicture(byId("wheel-picture"), { profile, ...answer });
+  const lines = ["angle", "normal", "shear", "strength"].map((name) => [...profile[name]].reverse());
+  plots.stress.set(lines, null,
+    `Stress against angle: normal stress up to ${number(Math.max(...profile.normal))} kPa, shear stress up to ${number(Math.max(...profile.shear))} kPa, entry at ${number(profile.angle[0])} degrees`);
   byId("mobilised").textContent = `${percent(profile.mobilised)} of the shear strength below the wheel is mobilised. Torque is the shear stress summed along the rim: it grows with slip, and with a smaller shear modulus K, until τ reaches the strength.`;
-}
-
-function keep() {
-  if (state.kept) return release();
-  const { at } = state.answer;
-  state.kept = state.answer;
-  byId("keep").setAttribute("aria-pressed", "true");
-  byId("keep").textContent = "Drop the kept curves";
-  byId("kept").hidden = false;
-  byId("kept").textContent = `Kept (dashed): torque ${withUnit(at.torque, "N m")}, pull ${withUnit(at.pull, "N")}, sinkage ${withUnit(at.sinkage, "mm")} at slip ${number(at.slip)}, load ${withUnit(at.load, "N")}.`;
-  return draw(state.answer);
-}
-
-function release() {
-  state.kept = null;
-  byId("keep").setAttribute("aria-pressed", "false");
-  byId("keep").textContent = "Keep these curves";
-  byId("kept").hidden = true;
-  if (state.answer) draw(state.answer);
 }
 
 /** Set soil parameters (SI units by path), as an estimate found them. */
