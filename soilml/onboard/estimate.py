@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -50,23 +50,7 @@ _WORDS = {
     Reason.NO_INFORMATION: "no reading has so little noise that it is used",
     Reason.CONTRADICTORY: "the files contradict each other",
 }
-
-
-def _unknown(inside: NDArray[np.bool_]) -> Floats:
-    return np.full(inside.shape, np.nan)
-
-
-def _outside(inside: NDArray[np.bool_]) -> NDArray[Any]:
-    return (~inside).astype(int)
-
-
-#: Fields of an `Estimate` that are not given, by whether readings are in range.
-_DEFAULTS: dict[str, Callable[[NDArray[np.bool_]], NDArray[Any]]] = {
-    **dict.fromkeys(("misfit", "exact_misfit", "exact_probability", "load"), _unknown),
-    "disagrees": lambda inside: np.zeros(inside.shape, dtype=bool),
-    "rows_used": lambda inside: inside.astype(int),
-    **dict.fromkeys(("rows_set_aside", "reason"), _outside),  # out of range is reason 1
-}
+_NOT_GIVEN: NDArray[Any] = np.zeros(0)  # Stands for a field that follows from the others
 
 
 @dataclass(frozen=True)
@@ -141,15 +125,14 @@ class Estimate(Result):
     in_range: NDArray[np.bool_]
     prior: PriorSummary
     errors: HeldOutErrors | None = field(default=None, repr=False)
-    # fields that are not given are those of single readings
-    misfit: Any = None
-    disagrees: Any = None
-    exact_misfit: Any = None
-    exact_probability: Any = None
-    rows_used: Any = None
-    rows_set_aside: Any = None
-    reason: Any = None
-    load: Any = None
+    misfit: Floats = field(default_factory=lambda: _NOT_GIVEN)
+    disagrees: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
+    exact_misfit: Floats = field(default_factory=lambda: _NOT_GIVEN)
+    exact_probability: Floats = field(default_factory=lambda: _NOT_GIVEN)
+    rows_used: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
+    rows_set_aside: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
+    reason: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
+    load: Floats = field(default_factory=lambda: _NOT_GIVEN)
 
     #: The fields that are arrays with the leading dimensions of the readings.
     ARRAYS: ClassVar[tuple[str, ...]] = (
@@ -159,10 +142,18 @@ class Estimate(Result):
     )
 
     def __post_init__(self) -> None:
+        """Fields that are not given are those of single readings."""
         inside = np.asarray(self.in_range)
-        for name, of_single_readings in _DEFAULTS.items():
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, of_single_readings(inside))
+        made: Any = dict.fromkeys(
+            ("misfit", "exact_misfit", "exact_probability", "load"),
+            lambda: np.full(inside.shape, np.nan),
+        )
+        made |= {"disagrees": lambda: np.zeros(inside.shape, dtype=bool)}
+        made |= {"rows_used": lambda: inside.astype(int)}
+        made |= dict.fromkeys(("rows_set_aside", "reason"), lambda: (~inside).astype(int))
+        for name, value in made.items():  # out of range is reason 1
+            if getattr(self, name) is _NOT_GIVEN:
+                object.__setattr__(self, name, value())
 
     @staticmethod
     def gaussian(
@@ -194,7 +185,7 @@ class Estimate(Result):
             in_range=in_range,
             prior=prior,
             errors=errors,
-            load=load,
+            load=_NOT_GIVEN if load is None else load,
         )
 
     @staticmethod
