@@ -40,9 +40,7 @@ SECTIONS: dict[str, dict[str, tuple[str, str]]] = {
         "example": (_OWN + "example", "files to try the commands with"),
         "init": (_OWN + "init", "a first model file: wheel, soil, priors, noise"),
         "serve": ("soilml.serve.command", "all of this in the browser"),
-        "show models": (_OWN + "models", "trained files that come with the package"),
-        "show soils": (_OWN + "soils", "published soils, or one with its source"),
-        "show effects": (_OWN + "effects", "effects that a model can include, or one of them"),
+        "show": (_OWN + "show", "published soils, effects, trained files; or one of them"),
         "setup check": (_OWN + "doctor", "libraries, trained files, output of this installation"),
         "setup completion": (_OWN + "completion", "completion for bash, zsh or fish"),
     },
@@ -92,7 +90,6 @@ SECTIONS: dict[str, dict[str, tuple[str, str]]] = {
 COMMANDS = {name: entry[0] for own in SECTIONS.values() for name, entry in own.items()}
 #: What the list says of commands of two words.
 GROUPS = {
-    "show": "what comes with the package",
     "setup": "this installation",
     "export": "files for a board or a simulator",
     "drive": "along a drive",

@@ -13,7 +13,7 @@ TYPED = {
     "soilml identify --met": "--method",
     "soilml identify m.toml --method p": "posterior",
     "soilml show soils wong1989/dry": "wong1989/dry_sand",
-    "soilml show effects slip-s": "slip-scale slip-sinkage",
+    "soilml show effects slip-si": "slip-sinkage",
     "soilml pull m.toml r.csv --gravity m": "moon mars",
     "soilml setup completion f": "fish",
     "soilml identify mo": "model.toml",

@@ -90,7 +90,7 @@ def test_generate_train_estimate_follow_each_other(tmp_path, runs_file, capsys):
 
 def test_soils_and_effects_list_their_catalogues(capsys):
     for words, names in {
-        "show soils": ("wong1989/dry_sand", "kphi"),
+        "show soils": ("wong1989/dry_sand",),
         "show soils comin2017/es-3": ("published as -830",),
         "show effects": ("slip-sinkage", "grousers", "exit-angle", "bulldozing"),
         "show effects grousers": ("height",),

@@ -64,8 +64,7 @@ def _names() -> dict[str, Iterable[str]]:
     from soilml.physics.soils.gravity_law import LAWS
 
     return {
-        "show soils name": list(soil_catalogue()),
-        "show effects name": list(EFFECTS),
+        "show name": [*soil_catalogue(), *EFFECTS],
         "soil": list(soil_catalogue()),
         "method": list(METHODS),
         "gravity_law": list(LAWS),
