@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -88,7 +88,6 @@ class TableEstimates:
     estimate: (n,).
     answered: Whether each had a row with all readings, (n,).
     rows: Rows with all readings of each group, (n,).
-    readings: Inputs of the file by group, of those answered; of all rows where there are no groups.
     files: Files that took part in each estimate, (n,), where several are fused.
     """
 
@@ -99,8 +98,6 @@ class TableEstimates:
     estimate: Estimate
     answered: NDArray[np.bool_]
     rows: NDArray[np.int64]
-    readings: list[dict[str, Any]]
-    box: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # narrower prior
     files: NDArray[np.int64] | None = None
 
     def columns(self, inputs: Sequence[str]) -> dict[str, Any]:
@@ -145,15 +142,15 @@ def estimates_of_table(
         wanted = ", ".join(column(name) for name in first.inputs)
         raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
     if by is None:
-        found, given = [], []
+        found = []
         for estimator, rows in zip(estimators, usable, strict=True):
             alone = estimator.sets is not None and estimator.sets.sets_only
             own = joint_readings if alone else row_readings
-            given.append(adjusted(estimator, own(estimator, table.rows(rows))))
+            given = adjusted(estimator, own(estimator, table.rows(rows)))
             with progress(f"estimating {int(rows.sum())} rows", int(rows.sum())) as done:
-                found.append(_estimates_of_rows(estimator, given[-1], rows, done))
+                found.append(_estimates_of_rows(estimator, given, rows, done))
         answered = np.any(usable, axis=0)
-        one = TableEstimates(first, table, None, [], found[0], answered, answered * 1, given[:1])
+        one = TableEstimates(first, table, None, [], found[0], answered, answered * 1)
         if len(found) == 1:
             return one
         fused = fuse_estimates(found)
@@ -167,7 +164,7 @@ def estimates_of_table(
     answered = np.asarray([name in place for name in names])
     counts = np.asarray([len(groups[name]) if name in groups else 0 for name in names])
     estimate = estimate.at(np.asarray([place.get(name, 0) for name in names]))
-    return TableEstimates(first, table, by, names, estimate, answered, counts, readings, box or {})
+    return TableEstimates(first, table, by, names, estimate, answered, counts)
 
 
 def _estimates_of_rows(

@@ -11,8 +11,6 @@ from soilml.errors import InputError
 
 if TYPE_CHECKING:
     from soilml.onboard.estimator import Estimator
-    from soilml.onboard.table_estimates import TableEstimates
-    from soilml.remarks import Remark
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
@@ -125,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
         ),
     )  # fmt: skip
     columns = found.columns(list(dict.fromkeys(n for one in estimators for n in one.inputs)))
-    remarks += presentation.remarks_on(found, estimators) + _advice(found)
+    remarks += presentation.remarks_on(found, estimators)
     if args.report is not None:
         presentation.check_size(len(columns["in_range"]))
 
@@ -150,26 +148,3 @@ def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> Non
             f"{args.trained} estimates {estimators[0].per_row[0]}, which differs from row to row "
             "of a run; omit --by"
         )
-
-
-def _advice(found: TableEstimates) -> list[Remark]:
-    """What to measure after a typical row, or after the group that is known least."""
-    import numpy as np
-
-    from soilml.experiment_design.next_rows import advice_after_estimate
-    from soilml.io.table import ALL
-    from soilml.onboard import presentation, table_estimates
-
-    place = presentation.typical(found)
-    if place is None or found.files is not None:
-        return []
-    if found.by is None:
-        row = found.table.rows(np.asarray([place]))
-        readings = table_estimates.row_readings(found.estimator, row)
-        head = f"after {found.table.place(place)} alone, a typical row: "
-    else:
-        readings = found.readings[int(found.answered[:place].sum())]
-        head = "" if found.by == ALL else f"{found.by} {found.names[place]}: "
-    own = found.estimate.mean[place], found.estimate.covariance[place]
-    advised = advice_after_estimate(found.estimator, *own, readings, found.box)
-    return [one.under(head) for one in (advised[-1:] if found.by is None else advised)]
