@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.held_out_errors import HeldOutErrors
-from soilml.onboard.joint_errors import are_comparable, fuse_rows
+from soilml.onboard.joint_errors import are_comparable, joint_errors
 from soilml.onboard.set_contract import Floats
 
 #: Estimates further apart than this are contradictory, in standard deviations of the difference.
@@ -45,14 +45,11 @@ class MultiSensorEstimate:
 
 
 def fuse_estimates(estimates: Sequence[Estimate]) -> MultiSensorEstimate:
-    r"""Fuse estimates of the same quantities and prior, of several sensors or of one repeatedly.
-
-    Repeated readings must be of one soil, slip and load; each is an estimate of the same file.
+    """Fuse estimates of the same quantities and prior, of a file for each of several sensors.
 
     They are weighed by variance under the correlation of their errors, which files trained from the
-    same data carry (`soilml.onboard.joint_errors`): repeated readings of a file share the error
-    that its soil causes. Where one file alone was better on the held-out rows, the fused estimate
-    is that file's. Its intervals are calibrated on held-out rows.
+    same data carry (`soilml.onboard.joint_errors`). Where one file alone was better on the held-out
+    rows, the fused estimate is that file's. Its intervals are calibrated on held-out rows.
 
     Estimates out of range are not used. A single remaining one is returned unchanged. Where none
     remains, or where two differ by more than `CONTRADICTION` standard deviations of their
@@ -132,11 +129,19 @@ def _fuse(
 
     The correlation between quantities is the mean over the estimates.
     """
+    rules = joint_errors(tuple(files))
+    assert rules is not None  # they are comparable
     stds = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3))
-    centre, std, low, high, disagreement = fuse_rows(mean, stds, files)
+    columns = []
+    for k, rule in enumerate(rules):
+        fused, spread, disagreement = rule.fuse(mean[..., k], stds[..., k])
+        columns.append((fused, spread, *rule.interval(fused, spread), disagreement))
+    centre, std, low, high, apart = (
+        np.stack(column, axis=-1) for column in zip(*columns, strict=True)
+    )
     correlation = np.mean(covariance / (stds[..., None] * stds[..., None, :]), axis=0)
-    fused = correlation * std[:, :, None] * std[:, None, :]
-    return centre, np.asarray(fused), low, high, disagreement.max(axis=-1)
+    joint = correlation * std[:, :, None] * std[:, None, :]
+    return centre, np.asarray(joint), low, high, apart.max(axis=-1)
 
 
 def _contradictory(mean: Floats, covariance: Floats, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -183,7 +188,11 @@ def _check_compatible(estimates: Sequence[Estimate]) -> None:
                     f"{_format_range(first.prior)} and {_format_range(other.prior)}; train both "
                     "from one recipe"
                 )
-    if not are_comparable([given.errors for given in estimates]):
+    files = [given.errors for given in estimates]
+    known = [errors for errors in files if errors is not None]
+    if len({*known}) < len(known):
+        raise InputError("two estimates are of one file: give one of each file")
+    if not are_comparable(files):
         raise InputError(
             "the files do not state their errors on common rows: train them from one data file"
         )

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from made_estimates import made_estimate
 
+from soilml.errors import InputError
 from soilml.onboard.estimate import PriorSummary, Reason
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.joint_errors import joint_errors
@@ -92,18 +93,10 @@ def test_fused_estimates_are_calibrated_whatever_the_correlation(common):
     assert np.mean(fused.disagreement**2) == pytest.approx(1.0, abs=0.1)
 
 
-@pytest.mark.parametrize("count", [2, 4, 8, 16])
-def test_repeated_readings_share_the_error_of_the_soil(count):
-    sensors = Sensors(soil=0.8)
-    file = sensors.files()[0]
-    assert file.common_share()[0] == pytest.approx(0.8, abs=1e-3)
-    truth, mean, std = sensors.draw(20000, count)
-    each = [estimate(mean[0, k], std[0, k], file) for k in range(count)]
-    fused = fuse_estimates(each).estimate
-    assert rmse(fused, truth) < rmse(each[0], truth)
-    # between the measured numbers, 1 and 8, it is interpolated; beyond them it is constant
-    assert cover(fused, truth) == pytest.approx(0.9, abs=0.015)
-    assert z_rms(fused, truth) == pytest.approx(1.0, abs=0.05)
+def test_two_estimates_of_one_file_are_refused():
+    file = Sensors().files()[0]
+    with pytest.raises(InputError, match="give one of each file"):
+        fuse_estimates([estimate([0.3], 0.05, file), estimate([0.31], 0.05, file)])
 
 
 def test_readings_that_disagree_widen_the_estimate_and_contradict_beyond_four_deviations():

@@ -7,7 +7,6 @@ import { Plot } from "./plots.js";
 import { Slider } from "./sliders.js";
 import { wheelPicture } from "./wheel_picture.js";
 
-const FROM_FILE = "model-file";
 const CURVES = { torque: "N m", pull: "N", sinkage: "mm" };
 const OPEN = 2; // groups of sliders that are open at first
 
@@ -24,11 +23,14 @@ function chosen() {
 }
 
 export async function startForward(choices) {
-  state.choices = choices;
-  fillChoices({ wheel: choices.wheels[0].id, soil: choices.first });
+  state.soils = choices.soils;
+  options(byId("wheel"), choices.wheels);
+  options(byId("soil"), choices.soils, choices.first);
   makePlots();
-  byId("wheel").addEventListener("change", choose);
-  byId("soil").addEventListener("change", choose);
+  for (const id of ["wheel", "soil"]) byId(id).addEventListener("change", () => {
+    state.model = "";
+    loadControls();
+  });
   byId("reset").addEventListener("click", () => {
     for (const slider of state.sliders.values()) slider.set(slider.first);
     update();
@@ -36,41 +38,13 @@ export async function startForward(choices) {
   await loadControls();
 }
 
-function fillChoices(first) {
-  const { wheels, soils } = state.choices;
-  const own = state.model ? [{ id: FROM_FILE, label: `from ${state.modelName}`, note: "" }] : [];
-  options(byId("wheel"), [...own, ...wheels], state.model ? FROM_FILE : first.wheel);
-  options(byId("soil"), [...own, ...soils], state.model ? FROM_FILE : first.soil);
-  notes();
-}
-
-function notes() {
-  const entry = state.choices.soils.find((e) => e.id === byId("soil").value);
-  byId("soil-note").textContent = entry ? entry.note : "as the model file has it";
-}
-
-async function choose() {
-  if (state.model && (byId("wheel").value !== FROM_FILE || byId("soil").value !== FROM_FILE)) {
-    const chosenOr = (id, first) => (byId(id).value === FROM_FILE ? first : byId(id).value);
-    const next = { wheel: chosenOr("wheel", state.choices.wheels[0].id), soil: chosenOr("soil", state.choices.first) };
-    state.model = "";
-    fillChoices(next);
-  }
-  notes();
-  await loadControls();
-}
-
 /** Take a model file that was dropped; its error stands beside the choices. */
 export async function takeModel(text, name) {
-  const before = [state.model, state.modelName];
-  const values = { wheel: byId("wheel").value, soil: byId("soil").value };
-  [state.model, state.modelName] = [text, name];
-  if (!(await loadControls())) {
-    [state.model, state.modelName] = before;
-    return false;
-  }
-  fillChoices(values);
-  return true;
+  const before = { model: state.model, modelName: state.modelName };
+  Object.assign(state, { model: text, modelName: name });
+  if (await loadControls()) return true;
+  Object.assign(state, before);
+  return false;
 }
 
 async function loadControls() {
@@ -85,6 +59,9 @@ async function loadControls() {
     return false;
   }
   if (mine !== generation) return true;
+  byId("soil-note").textContent = state.model
+    ? `Now: the model file, ${state.modelName}. Choose a gear or a soil to leave it.`
+    : state.soils.find((entry) => entry.id === byId("soil").value).note;
   const opened = new Map([...document.querySelectorAll("details.group")].map((d) => [d.dataset.title, d.open]));
   state.sliders = new Map();
   const groups = found.groups.map(({ title, controls }, i) => {
