@@ -32,9 +32,7 @@ friction angle and shear modulus, each with its uncertainty.
 EPILOG = "`soilml COMMAND --help` explains one command with an example."
 _OWN, _GROUND = "soilml.cli.commands.", "training.commands."
 
-#: Commands by section of the list: the module of each, and what the list says. They are present
-#: where the packages can be imported, installed or not. Those of other distributions have an entry
-#: point in the group `soilml.commands`.
+#: Commands by section of the list: the module of each, and what the list says.
 SECTIONS: dict[str, dict[str, tuple[str, str]]] = {
     "Start": {
         "example": (_OWN + "example", "files to try the commands with"),
@@ -141,16 +139,15 @@ def parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
     """
     layout: Any = argparse.RawDescriptionHelpFormatter
     chosen = None if words is None else _command_of(words)
-    known = COMMANDS if chosen else COMMANDS | _other_commands()
-    listed = "\n".join([DESCRIPTION, *_list(known)])
+    listed = "\n".join([DESCRIPTION, *_list()])
     usage = "soilml COMMAND ... [--help] [--version]"
     root = _Parser("soilml", usage, listed, EPILOG, formatter_class=layout)
     root.add_argument("--version", action="version", version=f"soilml {__version__}")
     required: dict[str, Any] = {"metavar": "COMMAND", "required": True}
     commands = root.add_subparsers(prog="soilml", help=argparse.SUPPRESS, **required)
     groups: dict[str, Any] = {}
-    helps = {name: entry[1] for own in SECTIONS.values() for name, entry in own.items()}
-    for name, path in known.items():
+    known = {name: entry for own in SECTIONS.values() for name, entry in own.items()}
+    for name, (path, said) in known.items():
         group, _, word = name.rpartition(" ")
         if group and group not in groups:
             text = f"{GROUPS[group][0].upper()}{GROUPS[group][1:]}."
@@ -158,12 +155,11 @@ def parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
             groups[group] = made.add_subparsers(**required)
         into = groups[group] if group else commands
         if words is not None and name != chosen:
-            into.add_parser(word, help=helps.get(name, ""))
+            into.add_parser(word, help=said)
             continue
         module = importlib.import_module(path)
-        sub = into.add_parser(
-            word, help=helps.get(name, ""), description=module.DESCRIPTION, formatter_class=layout
-        )
+        about = module.DESCRIPTION
+        sub = into.add_parser(word, help=said, description=about, formatter_class=layout)
         declare(sub, (*module.ARGUMENTS, "screen"))
         if formats := getattr(module, "FORMATS", ()):
             text = "form of the result on standard output (default: table)"
@@ -181,10 +177,9 @@ def _command_of(words: Sequence[str]) -> str:
     return next((" ".join(words[:n]) for n in (1, 2) if " ".join(words[:n]) in COMMANDS), "")
 
 
-def _list(known: dict[str, str]) -> Iterator[str]:
+def _list() -> Iterator[str]:
     """The lines of the list of commands; a group is one line."""
-    others = dict.fromkeys(known.keys() - COMMANDS.keys(), ("", "of another package"))
-    for title, own in (SECTIONS | ({"Others": others} if others else {})).items():
+    for title, own in SECTIONS.items():
         seen: dict[str, str] = {}
         for name, (_, text) in own.items():
             group, _, word = name.rpartition(" ")
@@ -195,19 +190,6 @@ def _list(known: dict[str, str]) -> Iterator[str]:
             seen[group] = f"{before}{', ' if before else ''}{word}: {GROUPS[group]}"
         yield f"{title}:"
         yield from (f"  {name:<10} {text}" for name, text in seen.items())
-
-
-def _other_commands() -> dict[str, str]:
-    """Modules of the commands of other distributions, by name."""
-    from importlib.metadata import entry_points
-
-    # an installation of this one that is older than its files may name a command that is gone
-    others = {
-        entry.name: entry.value
-        for entry in entry_points(group="soilml.commands")
-        if entry.dist is None or entry.dist.name != "soilml"
-    }
-    return {name: others[name] for name in sorted(others.keys() - COMMANDS.keys())}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
