@@ -77,7 +77,7 @@ bench: $(VENV)/.ready ## measure speed and accuracy, and write bench/results; go
 	@$(BIN)/python bench/run.py
 
 bench-gap: $(VENV)/.ready ## 739 sets with hidden effects against gates and baselines; goes on where it was ended
-	@$(BIN)/python bench/run.py gap gap-speed
+	@$(BIN)/python bench/run.py gap
 
 bench-gap-quick: $(VENV)/.ready ## a sample of these sets, of a seed to tune on: nothing is written
 	@$(BIN)/python bench/run.py gap --quick

@@ -86,9 +86,8 @@ def gap_table() -> str:
 
 
 def sets_table() -> str:
-    """Files beside the exact posterior: RMSE over all sizes, log density, coverage."""
+    """Files beside the exact posterior: RMSE over all sizes, and coverage."""
     ratios = lines_of("sets", "file, sets", "rows", "refused")
-    gaps = {x["file, sets"]: x for x in lines_of("sets", "gap, nat") if x["subset"] == "all"}
     covered = {x["file, sets"]: x for x in lines_of("sets", "subset", "c") if x["subset"] == "all"}
     rows = []
     for name in dict.fromkeys(line["file, sets"] for line in ratios):
@@ -97,8 +96,8 @@ def sets_table() -> str:
         own = [float(x[s]) for x in ratios if x["file, sets"] == name for s in ("c", "phi", "K")]
         held = ", ".join(covered[name][s].split(" / ")[0] for s in ("c", "phi", "K"))
         ends = f"{min(own):.3f} to {max(own):.3f}"
-        rows.append((name, ends, gaps.get(name, {}).get("gap, nat", ""), held))
-    head = ("file, sets of 1 to 32 rows", "RMSE over exact", "log density below, nat", "coverage")
+        rows.append((name, ends, held))
+    head = ("file, sets of 1 to 32 rows", "RMSE over exact", "coverage")
     return f"Sets beside the Bayes limit\n\n{format_table(head, rows)}"
 
 

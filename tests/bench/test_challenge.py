@@ -13,8 +13,7 @@ from soilml.errors import InputError
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
 import challenge
-from challenge import CAUSES
-from challenge_methods import COLUMNS, NONE, UNKNOWN, regression_draws, stated
+from challenge import CAUSES, COLUMNS, NONE
 
 
 @pytest.fixture(scope="module")
@@ -110,20 +109,3 @@ def test_the_true_distribution_has_the_best_expected_crps():
         mean[shift, scale] = float(challenge.crps(draws, readings).mean())
     assert min(mean, key=mean.__getitem__) == (0.0, 1.0)
     assert mean[0.0, 1.0] == pytest.approx(1.0 / np.sqrt(np.pi), abs=0.02)  # Gneiting et al. 2005
-
-
-def test_the_true_probabilities_have_the_best_expected_score():
-    rng, p = np.random.default_rng(4), stated({NONE: 0.5, UNKNOWN: 0.3, "grousers": 0.2}, CAUSES)
-    answers = rng.choice(CAUSES, size=4000, p=p)
-    flat, sharp = (x / x.sum() for x in (np.sqrt(p), p**2))
-    logs = [np.mean([np.log(own[CAUSES.index(a)]) for a in answers]) for own in (p, flat, sharp)]
-    assert logs[0] > max(logs[1:])
-
-
-def test_draws_of_a_regression_have_the_known_mean_and_spread():
-    """One weight of unit prior, seen once with unit noise: N(r / 2, 1 / 2), and noise on top."""
-    columns, runs = np.ones((2, 1)), np.asarray([True, False])
-    rng = np.random.default_rng(6)
-    draws = regression_draws(columns, np.asarray([2.0, 0.0]), np.ones(2), runs, 40000, rng)
-    assert draws.mean() == pytest.approx(1.0, abs=0.03)
-    assert draws.var() == pytest.approx(1.5, abs=0.05)
