@@ -78,11 +78,9 @@ def gap_table() -> str:
         own = next(line for line in every if line["figure"].startswith(start))
         shown = re.sub(r" \((\d+ sets)\)|; by chance.*", "", own["measured"])
         rows.append((words, shown, own["gate"], own["met"].replace("*", "")))
-    missed = [line["figure"] for line in gated if line["met"] != "yes"]
-    said = f"{len(gated) - len(missed)} of {len(gated)} gates are met"
-    said += f"; missed: {'; '.join(missed)}." if missed else "."
+    met = sum(line["met"] == "yes" for line in gated)
     head = ("blind sets", "measured (95 % interval), of", "gate", "met")
-    return f"Gap workflow: {said}\n\n{format_table(head, rows, 2)}"
+    return f"Gap workflow: {met} of {len(gated)} gates are met.\n\n{format_table(head, rows, 2)}"
 
 
 def sets_table() -> str:

@@ -32,9 +32,7 @@ RUNS = "run,slip,load_N,torque_Nm\na,0.1,60,1.5\na,0.3,80,3.0\na,0.5,90,5.0\n"
     ("module", "words"),
     [
         ("soilml.cli.main", "simulate model.toml --slip 0.1 --load 60"),
-        ("argparse", "simulate model.toml --slip 0.1 --load 60"),
         ("numpy", "simulate model.toml --slip 0.1 --load 60 --out out.csv"),
-        ("numpy.random", "identify model.toml runs.csv --out out.json"),
         ("scipy.special", "identify model.toml runs.csv --out out.json"),
         ("jinja2", "gap model.toml runs.csv --out found"),
         ("pyarrow", "generate wheel out.parquet --rows 10"),
