@@ -82,11 +82,11 @@ bench-gap: $(VENV)/.ready ## 739 sets with hidden effects against gates and base
 bench-gap-quick: $(VENV)/.ready ## a sample of these sets, of a seed to tune on: nothing is written
 	@$(BIN)/python bench/run.py gap --quick
 
-fuzz: $(VENV)/.ready ## fuzz every reader and public function for an hour: make fuzz FUZZ_SECONDS=3600
-	@$(BIN)/python tests/fuzz/fuzz_run.py --seconds $(or $(FUZZ_SECONDS),3600)
+fuzz: $(VENV)/.ready ## fuzz every reader and public function, about an hour: make fuzz FUZZ_EXAMPLES=5000
+	@FUZZ_EXAMPLES=$(or $(FUZZ_EXAMPLES),5000) $(BIN)/python -m pytest -n 2 tests/fuzz
 
-faults: $(VENV)/.ready ## kill commands at random moments and run them again: make faults FAULT_KILLS=200
-	@$(BIN)/python tests/faults/fault_run.py --kills $(or $(FAULT_KILLS),200)
+faults: $(VENV)/.ready ## kill commands at random moments and run them again: make faults FAULT_KILLS=30
+	@FAULT_KILLS=$(or $(FAULT_KILLS),30) $(BIN)/python -m pytest tests/faults/test_kills.py
 
 coverage: $(VENV)/.ready ## statements and branches that `make test` reaches, by room, half an hour on two cores
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \

@@ -22,17 +22,9 @@ import numpy as np
 from runner import Row, table
 
 from datagen.blind_sets import BlindSet, Plan, csv_text, draw_blind_set
-from datagen.blind_sets.plans import (
-    DISCREPANCIES,
-    FREE_COUNTS,
-    NOISE_LEVELS,
-    RUNS,
-    SIZES,
-    TIERS_WITHOUT_MECHANISM,
-    mechanism_keys,
-)
+from datagen.blind_sets.plans import TIERS_WITHOUT_MECHANISM, benchmark_plans
 from datagen.blind_sets.reading_errors import Sensor
-from datagen.blind_sets.soil_families import FAMILIES, RADIUS, WIDTH
+from datagen.blind_sets.soil_families import RADIUS, WIDTH
 from soilml.errors import InputError
 from soilml.physics.effects import EFFECTS
 from soilml.physics.gears import Wheel
@@ -56,45 +48,23 @@ RESAMPLES, ENDS = 4000, (0.05, 0.95)
 
 
 def plans(secret: str) -> Iterator[tuple[Plan, BlindSet]]:
-    """Sets of equally likely tiers that have one right answer."""
+    """Plans of the benchmark, of equally likely tiers that have one right answer."""
     number = 0
     while True:
         bits = hashlib.sha256(f"{secret} {number}".encode()).digest()[:16]
         number += 1
-        plan = draw_plan(TIERS, int.from_bytes(bits, "big"))
-        if plan.cause in AMBIGUOUS:
-            continue
+        seed = int.from_bytes(bits, "big")
+        of_tier = [
+            plan
+            for plan in benchmark_plans(seed)
+            if (plan.design, plan.tier) == ("sweep", TIERS[seed % len(TIERS)])
+            and plan.cause not in AMBIGUOUS
+        ]
+        plan = of_tier[seed // len(TIERS) % len(of_tier)]
         try:
             yield plan, draw_blind_set(plan)
         except RuntimeError:  # no soil of the family carries all rows
             continue
-
-
-def draw_plan(tiers: Sequence[str], seed: int) -> Plan:
-    """One plan at random, of the design `sweep`: every tier, cause and level is equally likely.
-
-    A smooth discrepancy of a random size is beside every mechanism, at least the smallest is in
-    tier D, and none where nothing is wrong with the model (tiers N).
-    """
-    generator = np.random.default_rng((seed, 3))
-
-    def one(levels: Sequence[Any]) -> Any:
-        return levels[int(generator.integers(len(levels)))]
-
-    tier = one(tiers)
-    cause = one(mechanism_keys(tier))
-    least = {"N": len(DISCREPANCIES), "D": 1}.get(tier[0], 0)
-    return Plan(
-        tier=tier,
-        cause=cause,
-        size=one(SIZES) if cause else 0.0,
-        noise=one(NOISE_LEVELS),
-        runs=one(RUNS),
-        soil_family=one(list(FAMILIES)),
-        free=one(FREE_COUNTS),
-        seed=seed,
-        discrepancy=one(DISCREPANCIES[least:] or (0.0,)),
-    )
 
 
 def digest(content: bytes) -> str:
