@@ -8,7 +8,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -27,7 +26,6 @@ from soilml import (
     Model,
     Operating,
     SlipSinkage,
-    Soil,
     Wheel,
     identify,
     simulate,
@@ -106,12 +104,6 @@ def accuracy_table(rows: list[Row]) -> str:
     return table(rows, {"slip": "slip"}, columns)
 
 
-def rows_of(ground: Soil, part: slice) -> Soil:
-    """Some rows of a soil whose parameters are arrays or numbers."""
-    arrays = {k: v[part] for k, v in vars(ground).items() if np.ndim(v) and len(v) > 1}
-    return replace(ground, **arrays)
-
-
 def speed(case: Row) -> list[Row]:
     """Solutions per second, beside scalar quadrature."""
     rows, rng = ROWS // 50 if case["quick"] else ROWS, np.random.default_rng(0)
@@ -124,14 +116,7 @@ def speed(case: Row) -> list[Row]:
     load, slip = rng.uniform(30.0, 120.0, rows), rng.uniform(0.05, 0.6, rows)
     wheel, box = Model(Wheel(radius=0.15, width=0.12)), input_box(BOX_ROWS, seed=123)
     box["slip"] = np.abs(box["slip"])
-    first = slice(BASELINE_ROWS)
-    columns = vars(rows_of(sand, first)) | {"radius": 0.15, "width": 0.12}
-    columns |= {"slip": slip[first], "load": load[first]}
-
-    def in_calls() -> None:
-        for start in range(0, rows // 4, 1000):
-            part = slice(start, start + 1000)
-            wheel(rows_of(sand, part), Operating(slip=slip[part], load=load[part]))
+    columns = vars(sand) | {"radius": 0.15, "width": 0.12, "slip": slip, "load": load}
 
     def row_by_row() -> None:
         for i in range(BASELINE_ROWS):
@@ -145,7 +130,6 @@ def speed(case: Row) -> list[Row]:
     calls: dict[str, tuple[Callable[[], object], int]] = {
         "adaptive quadrature and bracketing, row by row (scipy)": (row_by_row, BASELINE_ROWS),
         "rigid wheel, driving": (by(wheel), rows),
-        "the same, in calls of 1000 rows": (in_calls, rows // 4),
         "the same, over the whole input box of the accuracy table, with rows that are too heavy": (
             lambda: solved(box), BOX_ROWS,
         ),
