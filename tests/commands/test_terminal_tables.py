@@ -41,7 +41,7 @@ WORDS = {
 ELSEWHERE = {
     *("identify", "estimate", "pull", "gap"),
     *("init", "example", "setup completion", "serve", "import", "generate", "train", "adapt"),
-    *("compare", "plan runs", "export c", "export fusion", "export step", "export slip"),
+    *("compare", "plan runs", "export c", "export slip"),
     "export soil",  # in the units of the program that it writes for
     *("drive slip", "drive map", "paper climb", "paper wheel-leg", "paper sensor-wheel"),
     "paper track",

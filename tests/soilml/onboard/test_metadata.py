@@ -85,7 +85,7 @@ def test_a_malformed_entry_is_refused_by_every_command(tmp_path, capsys, monkeyp
 
     monkeypatch.setattr(model_file, "create_session", created)
     (tmp_path / "runs.csv").write_text(RUNS)
-    others = {"estimate": "runs.csv", "export-c": "m.c", "export-step": "step.onnx"}
+    others = {"estimate": "runs.csv", "export-c": "m.c"}
     for what, change in CHANGES.items():
         file = signed(SOURCE, tmp_path / "m.onnx", **change)
         every = what in ("null as set", "without gear")
