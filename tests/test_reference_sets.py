@@ -97,7 +97,7 @@ def test_uncertain_bearing_is_marginalised():
     family = read_any_wheel_spec("any_wheel").family
     assert isinstance(family, DimensionlessFamily)
     sets = family.sets(300, 1, 9)
-    o = sets.origin
+    o = sets
     more = sets.readings["sinkage_std"][:, 0] < 1.0
     uncertain = (o.noise["torque"][1][:, 0] > 0.06) & (o.normal_std > 0.2) & ~more
     index = int(np.flatnonzero(uncertain)[0])

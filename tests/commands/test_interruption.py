@@ -47,7 +47,9 @@ def test_ctrl_c_in_an_import(tmp_path, small_model, module, words):
         [sys.executable, "-c", INTERRUPTED, module, *words.format(model=small_model).split()],
         cwd=tmp_path, env=environment, capture_output=True, text=True,
     )  # fmt: skip
-    assert done.stderr == "soilml: interrupted; no output was written\n"
+    *progress, said = done.stderr.splitlines()  # a slow machine shows progress before
+    assert said == "soilml: interrupted; no output was written"
+    assert all(line.endswith(" ...") for line in progress)
     assert done.returncode == 128 + signal.SIGINT
     assert sorted(path.name for path in tmp_path.iterdir()) == ["model.toml", "runs.csv"]
 
