@@ -40,7 +40,7 @@ from soilml.io.table import Table
 from soilml.log_import import import_log, init_map
 from soilml.log_import.readers import read_log
 from soilml.parameters import declared
-from soilml.serve.chosen_case import case_of_text
+from soilml.serve.forward import case_of_text
 
 EXPORTED = Path(soilml.__file__).parents[1] / "exported"
 ONNX = (EXPORTED / "wheel_linear.onnx").read_bytes()
