@@ -10,7 +10,7 @@ import numpy as np
 from runner import ROOT, Bench, Row, Sample, each, percent, table
 from scipy.stats import binom
 
-from soilml import Estimator, SlipSinkage, read_case
+from soilml import SlipSinkage, read_case
 from soilml.config.case import Case
 from soilml.io.table import Table
 from soilml.numerics.quantiles import QUANTILES, quantile_band
@@ -26,8 +26,8 @@ SEEDS, LOADS = range(20_000, 20_030), (75.0, 200.0)
 SLIPS = (0.1, 0.3, 0.6)
 ROWS, DRIVEN_LOADS = 6, (30.0, 120.0)
 #: Who answers, and in which world.
-DEFAULT, EXACT, FILE, LACKING = "default", "--exact-model", "--from wheel", ", slip-sinkage missing"
-KINDS = (DEFAULT, EXACT, FILE, DEFAULT + LACKING, EXACT + LACKING)
+DEFAULT, EXACT, LACKING = "default", "--exact-model", ", slip-sinkage missing"
+KINDS = (DEFAULT, EXACT, DEFAULT + LACKING, EXACT + LACKING)
 ABOUT = (
     "Coverage of 90 % bands of drawbar pull and of the steepest slope (docs/how-to/pull.md), over "
     f"{len(SEEDS)} simulated soils: 95 of 100 exact bands show "
@@ -44,17 +44,17 @@ def cases(sample: Sample) -> list[Row]:
 
 
 @cache
-def known() -> tuple[Case, Case, Estimator]:
-    """The assumed case, the world with an effect that it lacks, and the trained file."""
+def known() -> tuple[Case, Case]:
+    """The assumed case, and the world with an effect that it lacks."""
     case = read_case(ROOT / "examples/wheel/model.toml")
     digging = SlipSinkage(n1=SlipSinkage.about.reference["n1"])
     lacking = replace(case, model=case.model + digging)
-    return case, lacking, Estimator.load(ROOT / "exported/wheel.onnx")
+    return case, lacking
 
 
 def one_soil(asked: Row) -> list[Row]:
     """Bands of a soil of the prior under each load, beside the truth of its world."""
-    case, lacking, file = known()
+    case, lacking = known()
     by = asked["by"]
     world = lacking if by.endswith(LACKING) else case
     rng = np.random.default_rng(asked["seed"])
@@ -65,7 +65,6 @@ def one_soil(asked: Row) -> list[Row]:
         simulated_rows(case, world, true, rng),
         loads=LOADS,
         slip_limit=SLIPS[-1],
-        estimator=file if by == FILE else None,
         exact_model=by.startswith(EXACT),
     )
     rows = []

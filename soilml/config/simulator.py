@@ -37,14 +37,8 @@ class Simulator:
     """The table [simulator] of a model file, and the error of the emulator of its runs."""
 
     runs: Path | None  # File of the runs; None where the model file has them within it
-    # The Python file and its function that make runs, None and "" where none does; or the command
-    # with {design} and {runs} that makes them. Neither is run by what reads a file
-    python: Path | None
-    function: str
-    command: str
     slip: tuple[float, float]  # Ranges of the design
     load: tuple[float, float]  # N
-    folder: Path | None  # In which the command is run: that of the model file
     gear: Gear  # Of the model file
     # Standard deviation of the emulator by column, in its unit; empty where no runs were read
     error: dict[str, float] = field(default_factory=dict)
@@ -52,20 +46,12 @@ class Simulator:
     # The runs: those of the file, or of the key `runs`, by which a recipe has them within it
     runs_read: Table | None = field(default=None, repr=False, compare=False)
 
-    @property
-    def code(self) -> str:
-        """What makes runs, as the model file has it; "" where nothing does."""
-        return self.command or (f"{self.python}:{self.function}" if self.python else "")
-
     def as_settings(self) -> dict[str, object]:
-        """The table [simulator], with the full paths of its files."""
-        python = f"{self.python.resolve()}:{self.function}" if self.python else ""
-        own: dict[str, object] = {"runs": Inline(self.columns())}
-        if self.runs is not None:
-            own = {"table": str(self.runs.resolve())}
-        made = {"python": python, "command": self.command}
-        own |= {key: text for key, text in made.items() if text}
-        return own | {"slip": list(self.slip), "load_N": list(self.load)}
+        """The table [simulator], with the full path of its file."""
+        if self.runs is None:
+            return self.within() | {"runs": Inline(self.columns())}
+        ranges = {"slip": list(self.slip), "load_N": list(self.load)}
+        return {"table": str(self.runs.resolve())} | ranges
 
     def columns(self) -> dict[str, list[float]]:
         """The runs that were read, as lists of numbers by column."""
@@ -81,23 +67,6 @@ def take_simulator(settings: Settings, gear: Gear) -> Simulator:
     """Read the table [simulator]; raises `InputError` for what is missing, unknown or wrong."""
     own_runs = _take_runs(settings) if "runs" in settings else None
     runs = settings.file("table") if own_runs is None else None
-    called, command = settings.text("python", ""), settings.text("command", "")
-    if called and command:
-        settings.fail("python and command are both given; needed is one of them")
-    file, _, function = called.rpartition(":")
-    if called and not file:
-        settings.fail(f"python is {called!r}; needed is FILE.py:FUNCTION")
-    try:
-        python = settings.files.path(file) if called else None
-        if command:
-            settings.files.path(command.split()[0])
-    except InputError as error:
-        settings.fail(f"{'python' if called else 'command'} {error}")
-    if command and not ("{design}" in command and "{runs}" in command):
-        settings.fail(
-            f"command is {command!r}; it must contain {{design}}, the table that it reads, and "
-            "{runs}, the table that it writes"
-        )
     ends = Numbers("[lowest, highest]", 2, rising=True)
     slip, load = (ends.take(settings, key, "") for key in ("slip", "load_N"))
     if not -1.0 < slip[0] < slip[1] < 1.0:
@@ -105,9 +74,7 @@ def take_simulator(settings: Settings, gear: Gear) -> Simulator:
     if load[0] <= 0.0:
         settings.fail("load_N must be above zero")
     settings.finish()
-    return Simulator(
-        runs, python, function, command, slip, load, settings.files.folder, gear, runs_read=own_runs
-    )
+    return Simulator(runs, slip, load, gear, runs_read=own_runs)
 
 
 def _take_runs(settings: Settings) -> Table:
@@ -138,7 +105,7 @@ def emulated(
         if not simulator.runs.is_file():
             raise InputError(
                 f"{simulator.runs}: there is no such file; `soilml plan runs` proposes the runs "
-                "of [simulator], and makes them where it has python or command"
+                "of [simulator]"
             )
         table = read_runs(simulator.runs)
     gear, emulator = emulator_of(table, simulator.gear, prior)

@@ -10,7 +10,6 @@ from soilml.experiment_design.design import (
 )
 from soilml.experiment_design.parameter_samples import (
     ParameterSamples,
-    samples_of_moments,
     samples_of_prior,
     samples_of_rows,
 )
@@ -25,7 +24,6 @@ __all__ = [
     "advise",
     "candidate_grid",
     "is_identified",
-    "samples_of_moments",
     "samples_of_prior",
     "samples_of_rows",
 ]

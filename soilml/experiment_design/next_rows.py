@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,15 +11,13 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.given_case import GivenCase, as_case
 from soilml.config.measurement_noise import Noise
-from soilml.errors import FitError, InputError, SoilmlError
+from soilml.errors import FitError, InputError
 from soilml.experiment_design import design
-from soilml.experiment_design.expected_answers import advise_by_answers, trained_case
 from soilml.experiment_design.parameter_samples import (
     ParameterSamples,
     samples_of_prior,
     samples_of_rows,
 )
-from soilml.experiment_design.presentation import next_row_remarks
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
@@ -30,9 +27,6 @@ from soilml.io.table import Table
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.quantities import column
 from soilml.remarks import Remark
-
-if TYPE_CHECKING:
-    from soilml.onboard.estimator import Estimator
 
 COUNT = 3  # Default number of rows in the sequence
 #: Samples and simulated readings of an advice that accompanies a result: takes half a second.
@@ -165,45 +159,6 @@ def advice_after_fit(
         )
     except (FitError, InputError):
         return None
-
-
-def advice_of_file(
-    estimator: Estimator,
-    mean: Floats,
-    covariance: Floats,
-    readings: Mapping[str, Floats],
-    box: Mapping[str, tuple[float, float]] | None = None,
-) -> design.Advice | None:
-    """Advice after an estimate, (q,) and (q, q), of readings (rows,); None where none is possible.
-
-    What a next row leaves is what the file itself answers with that row, within the narrower prior
-    `box` if there is one: its errors of sensors and of the model are in the expectation as they are
-    in the answer. Model, prior and noise of simulated readings are those of the recipe in the file;
-    slips, loads and sensors are those of its training. None where the recipe has what a case lacks:
-    sensor bias, vibration, speed, or slip as a target.
-    """
-    trained = trained_case(estimator)
-    if trained is None:
-        return None
-    case, ranges = trained
-    try:
-        return advise_by_answers(estimator, case, ranges, mean, covariance, readings, box or {})
-    except (SoilmlError, ValueError):  # LinAlgError is one: no covariance, or none of this case
-        return None
-
-
-def advice_after_estimate(
-    estimator: Estimator,
-    mean: Floats,
-    covariance: Floats,
-    readings: Mapping[str, Floats],
-    box: Mapping[str, tuple[float, float]] | None = None,
-) -> list[Remark]:
-    """Remarks on the next measurement; arguments as for `advice_of_file`."""
-    advice = advice_of_file(estimator, mean, covariance, readings, box)
-    if advice is None:
-        return []
-    return next_row_remarks(advice, "this row" if np.size(readings["slip"]) == 1 else "these rows")
 
 
 def mean_covariates(at: Operating) -> dict[str, float]:

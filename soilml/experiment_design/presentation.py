@@ -29,18 +29,15 @@ def is_identified(remaining_fraction: Floats) -> NDArray[np.bool_]:
     return np.asarray(remaining_fraction <= NOT_IDENTIFIED_ABOVE)
 
 
-def next_row_remarks(advice: Advice, rows: str = "these rows") -> list[Remark]:
-    """A remark on each parameter that is not identified, and one on the best row for all.
-
-    `rows` is "these rows" or "this row".
-    """
+def next_row_remarks(advice: Advice) -> list[Remark]:
+    """A remark on each parameter that is not identified, and one on the best row for all."""
     remarks = []
     for name, fraction in zip(advice.names, advice.current_fraction.tolist(), strict=True):
         if fraction > NOT_IDENTIFIED_ABOVE:
             text = (
-                f"{name.replace('_', ' ')}: not identified by {rows}, {share_left(fraction)} the "
+                f"{name.replace('_', ' ')}: not identified by these rows, {share_left(fraction)} "
+                f"the prior's width remains. {_most_informative(advice, name)}"
             )
-            text += f"prior's width remains. {_most_informative(advice, name)}"
             remarks.append(Remark(NEXT_ROW, text, (name,), "note"))
     best = f"best next row for all parameters: {row_message(advice, advice.best())}"
     return [*remarks, Remark(NEXT_ROW, best, advice.names, "note")]

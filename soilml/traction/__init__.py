@@ -11,7 +11,7 @@ from soilml.traction.pull_and_slope import (
     predictions_by_load,
 )
 from soilml.traction.report import PullReport, pull_report
-from soilml.traction.soil_draws import estimated_draws, posterior_draws, prior_draws
+from soilml.traction.soil_draws import prior_draws
 
 #: The name under which `soilml` has it
 pull = pull_report
@@ -22,8 +22,6 @@ __all__ = [
     "QuantileBand",
     "SoilDraws",
     "Traction",
-    "estimated_draws",
-    "posterior_draws",
     "predict_traction",
     "predictions_by_load",
     "prior_draws",

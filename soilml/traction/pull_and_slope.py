@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE
 from soilml.remarks import Remark
 from soilml.row_status import Status
 from soilml.traction.draws import SoilDraws
-from soilml.traction.gravity import LawComparison, compare_laws, draws_at_gravity
+from soilml.traction.gravity import draws_at_gravity
 from soilml.traction.measured_range import MeasuredRange, extrapolations
 
 #: Upper end of the slopes searched, rad (86 degrees); steeper ones are clipped to it.
@@ -225,15 +224,11 @@ def _identifiability(remaining_fraction: tuple[float, float]) -> Iterator[Remark
 
 @dataclass(frozen=True)
 class LoadPrediction:
-    """Pull and slope under one load, from the posterior and from the prior, with warnings.
-
-    `laws` are answers by each law of gravity, where that is in doubt.
-    """
+    """Pull and slope under one load, from the posterior and from the prior, with warnings."""
 
     posterior: Traction
     prior: Traction
     warnings: tuple[Remark, ...]
-    laws: LawComparison | None = None
 
     @property
     def remaining_fraction(self) -> tuple[float, float]:
@@ -261,37 +256,18 @@ def predictions_by_load(
 
     Raises `InputError` for a load that more than half of the draws do not carry at any sinkage.
     """
-    predictions = []
-    tested = draws
     if gravity is not None:
         draws, prior = (draws_at_gravity(case, d, gravity) for d in (draws, prior))
+    predictions = []
     for load in loads:
         _check_carried(case, draws, load, slip, covariates)
         after, before = (predict_traction(case, d, load, slip, covariates) for d in (draws, prior))
         bare = LoadPrediction(after, before, ())
-        texts: Iterable[Remark] = prediction_warnings(
+        warnings = prediction_warnings(
             after, bare.remaining_fraction, measured, error_included=draws.errors is not None
         )
-        laws = None
-        if gravity is not None:
-            answers = partial(_answers, case, load, slip, covariates)
-            laws = compare_laws(case, tested, gravity, answers)
-            texts = [*texts, *([] if laws is None else [laws.remark()])]
-        predictions.append(LoadPrediction(after, before, tuple(texts), laws))
+        predictions.append(replace(bare, warnings=tuple(warnings)))
     return predictions
-
-
-def _answers(
-    case: Case, load: float, slip: Floats, covariates: Mapping[str, float] | None, draws: SoilDraws
-) -> dict[str, Floats]:
-    """What laws of gravity are compared by: draws (n,), in the unit that is printed."""
-    found = predict_traction(case, draws, load, slip, covariates)
-    middle = len(slip) // 2 - 1
-    return {
-        "largest_pull_N": found.largest_pull,
-        "steepest_deg": np.rad2deg(found.steepest_slope),
-        f"sinkage_mm_slip_{slip[middle]:.2g}": 1e3 * found.sinkage[:, middle],
-    }
 
 
 def _width_ratio(posterior: Floats, prior: Floats) -> float:

@@ -14,7 +14,6 @@ from soilml.config.given_case import GivenCase, as_case
 from soilml.fitting.operating_points import operating_points
 from soilml.io.read_table import Rows, as_table
 from soilml.numerics.quantiles import band_columns, quantile_band
-from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import COVARIATES
 from soilml.physics.pull_efficiency import traffic_class
 from soilml.physics.soils.gravity_law import GravityChange
@@ -94,7 +93,6 @@ class PullReport(Result):
             of = re.compile(rf"(load_N|slip|{names})(_p05|_p95)?")
             own = {n: np.asarray(v)[shown] for n, v in columns.items() if of.fullmatch(n)}
             tables.append(ReportTable.of(head, own))
-        tables += [one.laws.table() for one in loads if one.laws is not None]
         sentences = [_sentence(one) for one in loads]
         under: dict[Remark, list[str]] = {}
         for one in loads:
@@ -147,7 +145,6 @@ def pull_report(
     free: Sequence[str] | None = None,
     loads: Sequence[float] | None = None,
     slip_limit: float | None = None,
-    estimator: Estimator | None = None,
     exact_model: bool = False,
     gravity: GravityChange | None = None,
 ) -> PullReport:
@@ -166,11 +163,9 @@ def pull_report(
         Vertical loads, N; by default those of the rows.
     slip_limit
         Highest slip, in (0, 1); by default the highest measured one, at least 0.6.
-    estimator
-        Trained estimator whose estimate replaces the posterior.
     exact_model
         Whether the soil is that of the model taken as exact, and not averaged over explanations as
-        in `identify`; not with an estimator.
+        in `identify`.
     gravity
         Gravity of the rows and of the prediction, with a law of the soil; loads are those of the
         prediction. By default both are the same.
@@ -183,13 +178,12 @@ def pull_report(
     Raises
     ------
     InputError
-        For a load that the soil does not carry, a slip limit outside (0, 1), or an estimator for
-        another gear.
+        For a load that the soil does not carry, or a slip limit outside (0, 1).
     FitError, TableError
         As `identify`.
     """
     case, table = as_case(case), as_table(table)
-    soil = measured_soil(case, table, free, estimator, exact_model)
+    soil = measured_soil(case, table, free, exact_model)
     case, warnings = soil.case, [*soil.warnings, *excluded_effects(soil.case)]
     table = table.rows(table.answered)
     at = operating_points(table)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from soilml.errors import InputError
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.read_table import Rows, as_table
 from soilml.numerics.quantiles import band_columns, quantile_band
-from soilml.onboard.estimator import Estimator
 from soilml.physics.soils.gravity_law import GravityChange
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
@@ -27,12 +25,7 @@ from soilml.report.report import Picture, Report
 from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
 from soilml.traction.draws import DrawnErrors, SoilDraws
-from soilml.traction.gravity import (
-    LawComparison,
-    compare_laws,
-    draws_at_gravity,
-    gravity_remark,
-)
+from soilml.traction.gravity import draws_at_gravity, gravity_remark
 from soilml.traction.measured_range import (
     MeasuredRange,
     band_content,
@@ -58,7 +51,6 @@ class RoverReport(Result):
     performance: RoverPerformance
     prior_steepest: Floats
     warnings: tuple[Remark, ...]
-    laws: LawComparison | None = None  # By each law of gravity, where that is in doubt
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each slope: medians and ends of 90 % bands, SI units."""
@@ -87,7 +79,7 @@ class RoverReport(Result):
             kind="pull",
             verdict=_verdict(self, still),
             lines=list(_lines(self, still)),
-            tables=[_slopes(self), *_wheels(self), *([self.laws.table()] if self.laws else [])],
+            tables=[_slopes(self), *_wheels(self)],
             pictures=[_picture(self)],
             remarks=self.warnings,
             next_steps=["stay below the lower end of the band, or measure rows that narrow it"],
@@ -110,7 +102,6 @@ def rover_report(
     free: Sequence[str] | None = None,
     slopes: Floats | None = None,
     slip_limit: float | None = None,
-    estimator: Estimator | None = None,
     exact_model: bool = False,
     gravity: GravityChange | None = None,
 ) -> RoverReport:
@@ -123,9 +114,8 @@ def rover_report(
     slopes: From 0 to 60 degrees, rad; by default 0 to 20 degrees in steps of 5, where all wheels
         stay on the ground.
     slip_limit: Highest slip; by default the highest measured one, at least 0.6.
-    estimator: Trained estimator whose estimate replaces the posterior.
     exact_model: Whether the soil is that of the model taken as exact, and not averaged over
-        explanations as in `identify`; not with an estimator.
+        explanations as in `identify`.
     gravity: Gravity of the rows, and of the rover in place of that of the case, with a law of the
         soil. By default the rows are from where the rover is.
 
@@ -139,7 +129,7 @@ def rover_report(
         tipping = case.rover.tipping_slope(float(LARGEST_SLOPE))
         slopes = SLOPES[tipping >= SLOPES]
     table = with_rover_columns(case, as_table(table))
-    soil = measured_soil(case, table, free, estimator, exact_model)
+    soil = measured_soil(case, table, free, exact_model)
     case, table = soil.case, table.rows(table.answered)
     if gravity is not None:
         case = with_gravity(case, gravity.target)
@@ -150,28 +140,12 @@ def rover_report(
     assert case.rover is not None
     loads = np.ravel(case.rover.loads(slopes)).tolist()
     draws, prior = soil.with_errors(slip, loads, CHANNELS)
-    laws = None
     if gravity is not None:
-        laws = compare_laws(case, draws, gravity, partial(_answers, case, slip, speed))
         draws, prior = (draws_at_gravity(case, d, gravity) for d in (draws, prior))
     found = rover_performance(case, draws, slopes, slip, speed)
     before = _steepest_before(case, prior, slip, speed)
-    warnings = (
-        *soil.warnings,
-        *([laws.remark()] if laws else []),
-        *_warnings(case, found, measured, prior.errors, gravity),
-    )
-    return RoverReport(len(table), measured, found, before, warnings, laws)
-
-
-def _answers(case: Case, slip: Floats, speed: float | None, draws: SoilDraws) -> dict[str, Floats]:
-    """What laws of gravity are compared by: draws (n,), in the unit that is printed."""
-    found = rover_performance(case, draws, np.zeros(1), slip, speed)
-    return {
-        "steepest_deg": np.rad2deg(found.steepest_slope),
-        "margin_N_level": found.margin[:, 0],
-        "deepest_mm_level": 1e3 * np.max([of[:, 0] for of in found.sinkage.values()], axis=0),
-    }
+    warnings = (*soil.warnings, *_warnings(case, found, measured, prior.errors, gravity))
+    return RoverReport(len(table), measured, found, before, warnings)
 
 
 def with_gravity(case: Case, gravity: float) -> Case:

@@ -23,7 +23,7 @@ OF_TEXT = {
         *("--mass", "--wheelbase", "--track", "--height"),
     ],
     "simulate": ["--slip", "--load"],
-    "plan next": ["--slip", "--load", "--gravity", "--tested-at", "--radius"],
+    "plan next": ["--slip", "--load"],
     "pull": ["--load", "--slope", "--gravity", "--tested-at"],
     "paper walk": ["--legs", "--stiffness", "--slip"],
 }

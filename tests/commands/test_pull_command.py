@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from conftest import MODEL
-from console import refused, rows_of
+from console import rows_of
 
 from soilml import Operating, read_case
 from soilml.cli import main
@@ -60,16 +60,3 @@ def test_curves_picture_and_words_agree_and_hold_the_truth(folder, capsys):
     said = " ".join(said.split())
     assert said.startswith("At 60 N the wheel pulls ") and "Traffic class there: " in said
     assert "torque alone hardly reveals" in said
-
-
-def test_a_trained_file_may_say_what_the_soil_is(folder, small_model, capsys):
-    assert main([*COMMAND, "--from", str(small_model), "--out", "pull.csv"]) == 0
-    rows = rows_of((folder / "pull.csv").read_text())
-    low, high = (float(rows[-1][f"drawbar_pull_N_{end}"]) for end in ("p05", "p95"))
-    assert low < truth(folder, 0.4).drawbar_pull < high
-    other = MODEL.replace("radius = 0.15", "radius = 0.2")
-    (folder / "model.toml").write_text(other)
-    refused([*COMMAND, "--from", small_model], capsys, "was trained with gear.radius 0.15")
-    (folder / "model.toml").write_text(MODEL.replace("[soil.prior]", "n = 0.9\n[soil.prior]"))
-    assert main([*COMMAND, "--from", str(small_model), "--out", "pull.csv"]) == 0
-    assert "was trained with n 1.1, the model file has 0.9" in capsys.readouterr().out

@@ -18,7 +18,7 @@ that the installed parts need does not work.
 #: What needs each library, beside the board's own two.
 USES = {
     "numpy": "everything",
-    "onnxruntime": "estimate, pull --from: model files",
+    "onnxruntime": "estimate: model files",
     "scipy": "identify, gap, pull, generate",
     "pyarrow": "Parquet tables; generate, train",
     "python-calamine": "spreadsheets (.xlsx)",

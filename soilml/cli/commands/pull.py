@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.option_values import SLIP
-from soilml.cli.options import InputFile, OutputFile, gravity_change
+from soilml.cli.options import OutputFile, gravity_change
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
     from soilml.config.case import Case
     from soilml.io.table import Table
-    from soilml.onboard.estimator import Estimator
     from soilml.traction.report import PullReport
     from soilml.traction.rover_report import RoverReport
 
@@ -25,14 +24,12 @@ measured rows, and the slope that a vehicle with such gears can climb, both
 with 90 % bands.
 
   soilml pull MODEL.toml RUNS.csv --load 80,120 --slip-limit 0.3 --out pull.csv
-  soilml pull MODEL.toml RUNS.csv --from exported/wheel.onnx
   soilml pull ROVER.toml RUNS.csv --slope 0,10,15 --gravity moon
   soilml pull MODEL.toml RUNS.csv --load 20 --gravity 1.62 --tested-at 9.81
 
 RUNS.csv is that of `soilml identify`. Soil, effects that the model may lack
-and its smooth error are drawn from one posterior given the rows, or the soil
-from the estimate of a trained file (--from). All rows are assumed to come from
-one soil, unless --by run asks for a result for each run.
+and its smooth error are drawn from one posterior given the rows. All rows are
+assumed to come from one soil, unless --by run asks for a result for each run.
 
 Loads are those of the rows, unless --load names others; slips reach 0.6, the
 highest measured slip, or --slip-limit. The bands include errors of the model,
@@ -56,7 +53,6 @@ ARGUMENTS = (
     "gravity",
     ("--slip-limit S", "largest slip considered", SLIP),
     "free",
-    ("--from MODEL.onnx", "use the soil that this trained file estimates", InputFile),
     "effects",
     "by",
     "rows",
@@ -81,7 +77,10 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.read_table import RUNS
     from soilml.traction.report import pull_report
 
-    _check(args)
+    if args.picture is not None and args.by is not None:
+        raise InputError(
+            "--picture draws one soil; select it with --where run=NAME instead of --by"
+        )
     table = read_rows(args, RUNS)
     options: dict[str, Any] = {
         "slip_limit": args.slip_limit,
@@ -106,11 +105,7 @@ def run(args: argparse.Namespace) -> int:
         args, args.model, table, available_effects(args), with_explanations=True
     )
     print_table_hints(table, case)
-    options |= {
-        "loads": loads,
-        "estimator": _estimator(args),
-        "gravity": gravity_change(args, case),
-    }
+    options |= {"loads": loads, "gravity": gravity_change(args, case)}
     found, failed = result_by_group(
         args, table, "predicting", lambda rows: pull_report(case, rows, **options)
     )
@@ -127,38 +122,12 @@ def _run_rover(args: argparse.Namespace, case: Case, table: Table, options: dict
     from soilml.traction.rover_report import rover_report
 
     slopes = None if args.slope is None else np.deg2rad(parse_numbers("--slope", args.slope))
-    change = gravity_change(args, case)
-    options |= {"slopes": slopes, "estimator": _estimator(args), "gravity": change}
+    options |= {"slopes": slopes, "gravity": gravity_change(args, case)}
     found, failed = result_by_group(
         args, table, "predicting", lambda rows: rover_report(case, rows, **options)
     )
     _write_results(args, found, failed)
     return 0
-
-
-def _estimator(args: argparse.Namespace) -> Estimator | None:
-    """The trained file of --from."""
-    if args.from_ is None:
-        return None
-    from soilml.optional_imports import need
-
-    need("onnxruntime", "pull")
-    from soilml.onboard.estimator import Estimator
-
-    return Estimator.load(args.from_)
-
-
-def _check(args: argparse.Namespace) -> None:
-    if args.picture is not None and args.by is not None:
-        raise InputError(
-            "--picture draws one soil; select it with --where run=NAME instead of --by"
-        )
-    if args.from_ is not None and args.exact_model:
-        raise InputError("--exact-model applies to the rows, not to the file of --from")
-    if args.from_ is not None and args.free is not None:
-        raise InputError(
-            "--free applies to the posterior; the parameters of --from are those of the model file"
-        )
 
 
 def _write_results(
