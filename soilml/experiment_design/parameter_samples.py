@@ -13,7 +13,7 @@ from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.readings import Readings
 from soilml.identification.averaged import soil_samples
 from soilml.identification.condensing import condensed
-from soilml.identification.posterior import PosteriorSamples, prior_fractions
+from soilml.identification.posterior import prior_fractions
 
 SAMPLES = 2048  # Default number of samples
 
@@ -61,16 +61,14 @@ def samples_of_rows(
     readings: Readings,
     free: Sequence[Coordinate],
     count: int = SAMPLES,
-    found: PosteriorSamples | None = None,
     exact_model: bool = False,
 ) -> ParameterSamples:
     """Samples of the soil that explains rows, averaged over explanations as by `identify`.
 
-    With `exact_model`, those of the exact posterior. `found` are samples that were drawn before.
-    Raises `FitError` as `identify` does, and where noise is not declared.
+    With `exact_model`, those of the exact posterior. Raises `FitError` as `identify` does, and
+    where noise is not declared.
     """
-    if found is None:
-        found = soil_samples(case, condensed(case, readings, free), free, exact_model)
+    found = soil_samples(case, condensed(case, readings, free), free, exact_model)
     index, multiplicity = np.unique(found.equally_weighted(count), return_counts=True)
     weights = multiplicity / multiplicity.sum()
     return ParameterSamples(tuple(free), found.sample.u[index], weights, found.noise_scale)

@@ -23,7 +23,7 @@ from soilml.onboard.table_estimates import (
     sensor_errors_shown,
 )
 from soilml.quantities import CHANNELS, NOT_IDENTIFIED_ABOVE, column
-from soilml.remarks import NEXT_ROW, Remark
+from soilml.remarks import Remark
 from soilml.report.numbers import shown_unit, significant
 from soilml.report.report import Report
 from soilml.report.tables import ReportTable
@@ -264,8 +264,7 @@ def estimate_report(
         verdict=verdict(columns, found.by, remarks),
         figures=None,
         tables=[ReportTable.of("Estimates", columns)],
-        remarks=[remark for remark in remarks if remark.code != NEXT_ROW],
-        next_steps=[remark.text for remark in remarks if remark.code == NEXT_ROW],
+        remarks=remarks,
         status="in range" if not outside else "mixed" if inside.any() else "out of range",
         tone="warn" if outside else "good",
         title=title,

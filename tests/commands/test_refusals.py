@@ -145,7 +145,6 @@ LINES = {
     "plan next model.toml runs.csv --picture o.svg": "must end in .png",
     "plan next model.toml runs.csv -o runs.csv": "would be overwritten",
     "plan next rate.toml --load 60": "speed",
-    "plan next model.toml --load 20 --radius 0.1": "--radius needs --gravity",
     "pull model.toml runs.csv --gravity 0": "gravity is 0 m/s^2; it must lie between",
     "pull rover.toml runs.csv --gravity pluto": "one of earth, moon, mars",
     "pull model.toml runs.csv --gravity moon --gravity-law bekker": "one of open, constant",

@@ -44,7 +44,7 @@ WORDS = {
     "estimate": [LINEAR, "runs.csv"],
     "plan next": ["m.toml", "runs.csv"],
     "pull": ["m.toml", "runs.csv", "--load", "60", "--slip-limit", "0.3"],
-    "plan wheels": ["rover.toml", "--designs", "9", "--draws", "50", "--sweep-only"],
+    "plan wheels": ["rover.toml", "--designs", "9", "--draws", "50"],
     "paper walk": ["--ground", "SSC-1,SSC-2", "--legs", "5"],
     "paper numbers": ["comin2017-slip"],
 }

@@ -28,8 +28,7 @@ Candidate channels are those whose noise is declared in [noise]: torque alone,
 and torque with each other channel. Without --load, loads from half to twice
 the measured ones are tried.
 """
-#: Largest number of rows planned in a sequence, and of operating points (slips times loads).
-MAX_COUNT, MAX_POINTS = 5, 1000
+MAX_COUNT = 5  # Largest number of rows planned in a sequence
 ARGUMENTS = (
     "model-and-any-runs",
     ("--slip S,...", "candidate slips: A,B,... or start:stop:count"),
@@ -52,16 +51,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import deliver
     from soilml.cli.progress import working
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
-    from soilml.experiment_design import advise, candidate_grid
-    from soilml.experiment_design.next_rows import COUNT, known_soil, mean_covariates
-    from soilml.experiment_design.presentation import (
-        advice_columns,
-        best_rows,
-        next_row_remarks,
-        report_of_advice,
-    )
+    from soilml.experiment_design.next_rows import COUNT, advise
     from soilml.io.read_table import RUNS
-    from soilml.remarks import Remark
 
     if args.where is not None and args.runs is None:
         raise InputError("--where selects rows of RUNS.csv; give RUNS.csv too")
@@ -73,35 +64,16 @@ def run(args: argparse.Namespace) -> int:
     case = read_case_of_rows(args, args.model, table, available_effects(args), with_bias=False)
     if table is not None:
         print_table_hints(table, case)
-    with working("taking the rows into account"):
-        known = known_soil(case, table, parse_names(args.free), args.exact_model)
-    case, at, samples, notes = known.case, known.measured, known.samples, list(known.notes)
-    ranges = candidate_grid(slips, loads, known.loads)
-    if len(ranges.slips) * len(ranges.loads) > MAX_POINTS:
-        raise InputError(
-            f"{len(ranges.slips)} slips times {len(ranges.loads)} loads are too many to try; "
-            f"at most {MAX_POINTS} operating points are possible"
-        )
     with working("rating the rows that could be next"):
-        covariates = {} if at is None else mean_covariates(at)
-        advice = advise(
-            case, samples, ranges, measured=at, count=args.count or COUNT, covariates=covariates
+        found = advise(
+            case,
+            table,
+            free=parse_names(args.free),
+            slips=slips,
+            loads=loads,
+            count=args.count or COUNT,
+            exact_model=args.exact_model,
         )
-    remarks = [] if at is None else [*next_row_remarks(advice), *notes]
-    if case.states_model_error:
-        which = "[discrepancy]" if case.remainder is None else "error of the [remainder]"
-        text = f"the {which} of a next row counts as independent of that of other rows: "
-        remarks.append(Remark("independent-discrepancy", f"{text}repetitions are overrated"))
-    if advice.excluded_points:
-        text = (
-            f"{advice.excluded_points} of {len(ranges.slips) * len(ranges.loads)} operating points "
-            "are excluded: a twentieth or more of the posterior samples does not carry the wheel"
-        )
-        remarks.append(Remark("not-carried", text))
-    report = report_of_advice(advice, at, remarks)
-    rows = best_rows(advice)
-    if args.all:
-        rows = [("candidate", c) for c in sorted(advice.choices, key=lambda c: c.overall)]
-    columns = advice_columns(advice, rows)
-    deliver(args, report, columns=columns)
+    columns = found.frame_columns() if args.all else found.best_columns()
+    deliver(args, found.report(), columns=columns)
     return 0

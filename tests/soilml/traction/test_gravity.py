@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from measured_rows import torque_rows
-from remarked import remarked
 
 from soilml import Operating
 from soilml.numerics.quantiles import quantile_band
@@ -30,7 +29,7 @@ def test_draws_are_those_of_a_model_with_the_changed_soil(case):
 
 
 @pytest.mark.slow
-def test_the_open_band_holds_the_medians_of_both_schools_and_says_what_the_law_costs(case):
+def test_the_open_band_holds_the_medians_of_both_schools(case):
     truth = {"cohesion": 300.0, "friction_angle": 0.6, "shear_modulus": 0.012}
     table = torque_rows(case, truth, [0.1, 0.3, 0.5], [20.0, 60.0, 120.0])
     reports = {
@@ -47,6 +46,3 @@ def test_the_open_band_holds_the_medians_of_both_schools_and_says_what_the_law_c
             assert (band.lower < median).all() and (median < band.upper).all(), (name, law)
     known = pull_report(case, table, loads=[20.0], exact_model=True)  # loads are the prediction's
     np.testing.assert_array_equal(found["constant"].pull, known.by_load[0].posterior.pull)
-    width, *narrow = (quantile_band(found[law].largest_pull).width for law in ("open", *SCHOOLS))
-    share = f"makes {1.0 - np.mean(narrow) / width:.0%} of the band of largest_pull_N"
-    assert remarked(reports["open"].by_load[0].warnings, share)
