@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import InputError
-from soilml.io.declared_settings import Numbers
+from soilml.io.declared_settings import Key, Numbers, take_declared
 from soilml.io.read_table import read_table
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
@@ -22,6 +23,7 @@ from soilml.optional_imports import need
 from soilml.parameters import declared
 from soilml.physics.gears.base import Gear
 from soilml.physics.gears.emulated import EmulatedGear
+from soilml.physics.operating_point import MOST_SLIP
 from soilml.physics.soils import Soil
 from soilml.quantities import CHANNELS, QUANTITIES, column
 
@@ -30,6 +32,7 @@ from soilml.quantities import CHANNELS, QUANTITIES, column
 FEWEST, ADVISED = 5, 10
 #: Relative difference of the outputs of two runs with equal inputs that is taken for rounding.
 SAME = 1e-6
+LEAST_LOAD, MOST_LOAD = 1e-6, 1e7  # N, of tables
 
 
 @dataclass(frozen=True)
@@ -63,31 +66,46 @@ class Simulator:
         return {"runs": self.columns(), "slip": list(self.slip), "load_N": list(self.load)}
 
 
+class RunsWithin:
+    """The runs of a simulator within settings: a list of as many numbers for each column."""
+
+    def take(self, settings: Settings, key: str, kind: str) -> Table:
+        """The runs as a table."""
+        needed = "lists of as many numbers, by column"
+        found = settings.take(key, dict, needed)
+        try:
+            columns = {name: np.asarray(own, dtype=np.float64) for name, own in found.items()}
+        except (TypeError, ValueError):
+            settings.fail(f"{key} has a value that is no number; needed are {needed}")
+        if {x.ndim for x in columns.values()} != {1} or len({*map(len, columns.values())}) != 1:
+            settings.fail(f"{key} has columns of different lengths; needed are {needed}")
+        return Table(columns, f"{settings.where} {key}")
+
+
+_ENDS = "[lowest, highest]"
+
+
+@dataclass(frozen=True)
+class _SimulatorTable:
+    """The table [simulator], but for the file `table`."""
+
+    slip: Annotated[
+        tuple[float, float],
+        Numbers(f"{_ENDS}, between -1 and 1", 2, -MOST_SLIP, MOST_SLIP, rising=True),
+    ]
+    load: Annotated[
+        tuple[float, float],
+        Key("load_N"),
+        Numbers(f"{_ENDS}, above zero", 2, LEAST_LOAD, MOST_LOAD, rising=True),
+    ]
+    runs: Annotated[Table | None, RunsWithin()] = None
+
+
 def take_simulator(settings: Settings, gear: Gear) -> Simulator:
     """Read the table [simulator]; raises `InputError` for what is missing, unknown or wrong."""
-    own_runs = _take_runs(settings) if "runs" in settings else None
-    runs = settings.file("table") if own_runs is None else None
-    ends = Numbers("[lowest, highest]", 2, rising=True)
-    slip, load = (ends.take(settings, key, "") for key in ("slip", "load_N"))
-    if not -1.0 < slip[0] < slip[1] < 1.0:
-        settings.fail("slip must lie between -1 and 1")
-    if load[0] <= 0.0:
-        settings.fail("load_N must be above zero")
-    settings.finish()
-    return Simulator(runs, slip, load, gear, runs_read=own_runs)
-
-
-def _take_runs(settings: Settings) -> Table:
-    """The runs of the key `runs`, a list of numbers for each column."""
-    needed = "lists of as many numbers, by column"
-    found = settings.take("runs", dict, needed)
-    try:
-        columns = {key: np.asarray(values, dtype=np.float64) for key, values in found.items()}
-    except (TypeError, ValueError):
-        settings.fail(f"runs has a value that is no number; needed are {needed}")
-    if len({x.shape for x in columns.values()}) != 1 or next(iter(columns.values())).ndim != 1:
-        settings.fail(f"runs has columns of different lengths; needed are {needed}")
-    return Table(columns, f"{settings.where} runs")
+    runs = None if "runs" in settings else settings.file("table")
+    own = take_declared(_SimulatorTable, settings)
+    return Simulator(runs, own.slip, own.load, gear, runs_read=own.runs)
 
 
 def emulated(

@@ -166,7 +166,9 @@ def test_runs_that_cannot_stand_in_for_equations_are_refused(folder, tmp_path):
     assert "does not vary cohesion, which has a prior" in refused(tmp_path, table=fixed)
     blind = {name: columns[name] for name in ("slip", "load_N", "cohesion_Pa")}
     assert "no run has torque_Nm" in refused(tmp_path, table=blind)
-    assert "slip must lie between -1 and 1" in refused(tmp_path, SIMULATOR.replace("0.6]", "1.6]"))
+    assert "[lowest, highest], between -1 and 1" in refused(
+        tmp_path, SIMULATOR.replace("0.6]", "1.6]")
+    )
 
 
 def test_rows_outside_the_runs_are_refused(folder, tmp_path, capsys):
