@@ -16,9 +16,8 @@ from soilml.io.table import Table
 from soilml.numerics.quantiles import QUANTILES, quantile_band
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
+from soilml.traction import Vehicle, performance, pull_report
 from soilml.traction.draws import SoilDraws
-from soilml.traction.pull_and_slope import predict_traction
-from soilml.traction.report import pull_report
 
 #: Soils that nothing was settled with; a load among those driven, and one that is not (N).
 SEEDS, LOADS = range(20_000, 20_030), (75.0, 200.0)
@@ -70,8 +69,9 @@ def one_soil(asked: Row) -> list[Row]:
     rows = []
     for load, found in zip(LOADS, report.by_load, strict=True):
         band = found.posterior
-        shown = [int(np.argmin(np.abs(band.slip - s))) for s in SLIPS]
-        real = predict_traction(world, true, load, band.slip)
+        shown = [int(np.argmin(np.abs(band.curve_slip - s))) for s in SLIPS]
+        wheel = Vehicle.of_wheel(world, load)
+        real = performance(wheel, true, np.zeros(0), band.curve_slip)
         slope = quantile_band(band.steepest_slope)
         rows.append(
             {

@@ -18,7 +18,7 @@ from soilml.physics.soils.gravity_law import LAWS, GravityChange
 from soilml.report.aligned_text import format_table
 from soilml.report.figure_style import save_png
 from soilml.report.tables import Column, ReportTable
-from soilml.traction import Traction, predict_traction
+from soilml.traction import Performance, Vehicle, performance
 from soilml.traction.gravity import draws_at_gravity
 from soilml.traction.measured_range import MeasuredRange, slip_grid
 from soilml.traction.soil_draws import measured_soil
@@ -39,18 +39,19 @@ def make() -> None:
     (HERE / "runs.csv").write_text(csv_text(columns))
 
 
-def answers(case, table) -> dict[str, Traction]:
+def answers(case, table) -> dict[str, Performance]:
     """The pull on the Moon by each law, and that on Earth under the same load."""
     draws = measured_soil(case, table).draws
     slips = slip_grid(None, MeasuredRange.of(table["slip"], table["load_N"]))
-    earth = predict_traction(case, draws, LOAD, slips)
+    wheel, level = Vehicle.of_wheel(case, LOAD), np.zeros(0)
+    earth = performance(wheel, draws, level, slips)
     at = int(np.argmin(np.abs(slips - SLIP)))
     found, lines = {}, []
     for law in LAWS:
         own = draws_at_gravity(case, draws, GravityChange(EARTH, MOON, law))
-        moon = found[law] = predict_traction(case, own, LOAD, slips)
+        moon = found[law] = performance(wheel, own, level, slips)
         cells = [law]
-        for part in ("pull", "sinkage"):
+        for part in ("pull", "deepest"):
             band = quantile_band(getattr(moon, part)[:, at] / getattr(earth, part)[:, at])
             cells.append(f"{band.middle:.2f} ({band.lower:.2f} to {band.upper:.2f})")
         lines.append(cells)
@@ -75,8 +76,10 @@ def draw(pulls, path: Path) -> None:
         panel = axes[0, 0]
         for law, found in pulls.items():
             band, color = quantile_band(found.pull), COLORS[law]
-            panel.fill_between(found.slip, band.lower, band.upper, color=color, alpha=0.3, lw=0)
-            panel.plot(found.slip, band.middle, color=color, label=law, zorder=3)
+            panel.fill_between(
+                found.curve_slip, band.lower, band.upper, color=color, alpha=0.3, lw=0
+            )
+            panel.plot(found.curve_slip, band.middle, color=color, label=law, zorder=3)
         panel.set_xlabel("slip")
         panel.set_ylabel(f"pull on the Moon under {LOAD:.0f} N, N")
         panel.legend(title="law of gravity", frameon=False, fontsize=9, loc="upper left")

@@ -16,7 +16,7 @@ from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.rover_design.study import DesignStudy
 from soilml.rover_design.worlds import DrawnWorlds
-from soilml.traction.rover_performance import NeededSlip
+from soilml.traction.vehicle import NeededSlip
 
 #: Slips of a sweep and of a reported design, as shares of the slip limit.
 SWEPT = np.asarray([0.12, 0.3, 0.55, 0.8, 1.0])
@@ -62,7 +62,7 @@ def evaluate(
         DP_i = DP(s, W_i) + W_i (e_1 + e_2 s) + \delta(s, W_i)
 
     The first, at the least slip s that all wheels share, gives the slip that the slope needs, as in
-    `soilml.traction.rover_performance`. The errors of the model e and delta are those of the world.
+    `soilml.traction.vehicle`. The errors of the model e and delta are those of the world.
 
     designs: Values (k,) by dimension of the study.
     shares: Slips, as shares of the slip limit.

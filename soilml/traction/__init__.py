@@ -4,26 +4,22 @@ from __future__ import annotations
 
 from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.traction.draws import SoilDraws
-from soilml.traction.pull_and_slope import (
-    LoadPrediction,
-    Traction,
-    predict_traction,
-    predictions_by_load,
-)
+from soilml.traction.prediction import Prediction
 from soilml.traction.report import PullReport, pull_report
 from soilml.traction.soil_draws import prior_draws
+from soilml.traction.vehicle import Performance, Vehicle, performance
 
 #: The name under which `soilml` has it
 pull = pull_report
 
 __all__ = [
-    "LoadPrediction",
+    "Performance",
+    "Prediction",
     "PullReport",
     "QuantileBand",
     "SoilDraws",
-    "Traction",
-    "predict_traction",
-    "predictions_by_load",
+    "Vehicle",
+    "performance",
     "prior_draws",
     "pull",
     "pull_report",

@@ -51,9 +51,7 @@ def pull(case):
 
 
 def rover(case):
-    from soilml.traction.rover_report import rover_report
-
-    return rover_report(read_case(ROVER), Table(dict(ROWS)), slopes=np.asarray([0.0, 0.1]))
+    return pull_report(read_case(ROVER), Table(dict(ROWS)), slopes=np.asarray([0.0, 0.1]))
 
 
 def imported(case):

@@ -9,7 +9,7 @@ from measured_rows import torque_rows
 from soilml import Operating
 from soilml.numerics.quantiles import quantile_band
 from soilml.physics.soils.gravity_law import GravityChange
-from soilml.traction import SoilDraws, predict_traction
+from soilml.traction import SoilDraws, Vehicle, performance
 from soilml.traction.gravity import draws_at_gravity
 from soilml.traction.report import pull_report
 
@@ -20,12 +20,12 @@ SCHOOLS = ("constant", "proportional")
 def test_draws_are_those_of_a_model_with_the_changed_soil(case):
     draws = SoilDraws(("cohesion", "friction_angle"), np.asarray([[0.0, 0.5], [900.0, 0.6]]))
     moved = draws_at_gravity(case, draws, GravityChange(EARTH, MOON, "proportional"))
-    found = predict_traction(case, moved, 20.0, np.asarray([0.3]))
+    found = performance(Vehicle.of_wheel(case, 20.0), moved, np.zeros(0), np.asarray([0.3]))
     soil = replace(case.soil, kphi=case.soil.kphi * MOON / EARTH)
     soil = replace(soil, cohesion=draws.values[:, 0], friction_angle=draws.values[:, 1])
     force = case.model(soil, Operating(slip=0.3, load=20.0))
     np.testing.assert_allclose(found.pull[:, 0], force.drawbar_pull, rtol=1e-9)
-    np.testing.assert_allclose(found.sinkage[:, 0], force.sinkage, rtol=1e-9)
+    np.testing.assert_allclose(found.deepest[:, 0], force.sinkage, rtol=1e-9)
 
 
 @pytest.mark.slow
@@ -39,7 +39,7 @@ def test_the_open_band_holds_the_medians_of_both_schools(case):
         for law in ("open", *SCHOOLS)
     }
     found = {law: report.by_load[0].posterior for law, report in reports.items()}
-    for name in ("largest_pull", "sinkage", "steepest_slope"):
+    for name in ("largest_pull", "deepest", "steepest_slope"):
         band = quantile_band(getattr(found["open"], name))
         for law in SCHOOLS:
             median = quantile_band(getattr(found[law], name)).middle
