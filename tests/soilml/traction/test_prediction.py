@@ -35,10 +35,13 @@ def test_on_the_steepest_slope_the_largest_pull_equals_the_component_of_the_load
     soil = draws.of(case, np.arange(50)[:, None])
     at = Operating(slip=SLIPS, load=80.0 * np.cos(found.steepest_slope)[:, None])
     pull = np.nan_to_num(np.asarray(soil.model(soil.soil, at).drawbar_pull), nan=-np.inf)
-    moves = np.isfinite(found.steepest_slope)
     weight = 80.0 * np.sin(found.steepest_slope)
-    np.testing.assert_allclose(pull.max(axis=1)[moves], weight[moves], atol=1e-6)
-    assert not moves.all() and (found.largest_pull[~moves] <= 0.0).all()  # downhill only
+    np.testing.assert_allclose(pull.max(axis=1), weight, atol=1e-6)
+
+
+def test_a_wheel_that_only_goes_downhill_has_no_steepest_slope(case):
+    found = pulled(case, soils((0.0, 0.05, 0.02)), 80.0)
+    assert found.largest_pull[0] < 0.0 and np.isnan(found.steepest_slope[0])
 
 
 def test_effects_of_the_soil_count_and_those_of_rig_and_sensors_do_not(case):

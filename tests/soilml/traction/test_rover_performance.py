@@ -70,8 +70,6 @@ def passes(case):
 def test_wheels_in_a_rut_are_those_of_the_second_pass(case):
     again = replace(case, model=case.model + EFFECTS["multipass"]())
     assert passes(again) == {name: 1 + name.startswith("rear") for name in FOUR}
-    plain, found = (performance(Vehicle.of_rover(c), draws(), SLOPES, SLIP) for c in (case, again))
-    assert found.pull[0, -1] != plain.pull[0, -1]
     apart = {k: replace(w, left=2.0 * w.left) if "rear" in k else w for k, w in FOUR.items()}
     beside = replace(again, rover=replace(case.rover, wheels=apart))
     assert set(passes(beside).values()) == {1}
