@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
+from soilml.optional_imports import need
 from soilml.processes import process_map, usable_cores
 from soilml.rover_design.performance import SWEPT, Outcomes, evaluate
 from soilml.rover_design.study import DesignStudy
@@ -83,6 +84,7 @@ def searched(
 
     References: Sobol, USSR Comput. Math. Math. Phys. 7(4), 1967 (points within the limits).
     """
+    need("scipy", "design")
     from scipy.stats import qmc
 
     sizes = [count, *[max(1, round(SHARE * count))] * ROUNDS]
