@@ -51,10 +51,10 @@ class Simulator:
 
     def as_settings(self) -> dict[str, object]:
         """The table [simulator], with the full path of its file."""
-        if self.runs is None:
-            return self.within() | {"runs": Inline(self.columns())}
-        ranges = {"slip": list(self.slip), "load_N": list(self.load)}
-        return {"table": str(self.runs.resolve())} | ranges
+        found: dict[str, object] = {"runs": Inline(self.columns())}
+        if self.runs is not None:
+            found = {"table": str(self.runs.resolve())}
+        return found | {"slip": list(self.slip), "load_N": list(self.load)}
 
     def columns(self) -> dict[str, list[float]]:
         """The runs that were read, as lists of numbers by column."""

@@ -42,12 +42,11 @@ NO_ROWS = np.zeros((1, 1), np.float32)  # Log likelihood of no rows
 
 @dataclass(frozen=True)
 class CandidateRow:
-    """A row to measure: slip, load (N) and channels; a repetition has a measured point."""
+    """A row to measure: slip, load (N) and channels."""
 
     slip: float
     load: float
     channels: tuple[str, ...]
-    is_repetition: bool = False
 
     @property
     def description(self) -> str:
@@ -121,7 +120,7 @@ def repeated_points(measured: Operating, channels: tuple[str, ...] = ()) -> list
     if len(points) > REPETITIONS:
         kept = np.linspace(0, len(points) - 1, REPETITIONS).round().astype(int)
         points = [points[i] for i in kept]
-    return [CandidateRow(*point, channels=channels, is_repetition=True) for point in points]
+    return [CandidateRow(*point, channels=channels) for point in points]
 
 
 @dataclass(frozen=True)

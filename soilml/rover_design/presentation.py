@@ -8,10 +8,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED, take_axes
+from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED
 from soilml.report.numbers import (
     format_band,
     format_quantity,
@@ -53,7 +52,7 @@ def report_of_design(found: DesignReport, title: str) -> Report:
         tables=[_designs(found), *_tables(found)],
         pictures=[
             Picture(
-                "Designs", partial(plot_designs, found), 2, 2, SIZE, _verdict(found),
+                "Designs", partial(_draw_designs, found), 1, 3, SIZE, _verdict(found),
                 "Points: the designs that were tried. Large point: the best one.",
             )
         ],
@@ -169,29 +168,22 @@ def _tables(found: DesignReport) -> Iterator[ReportTable]:
         )
 
 
-SIZE = (10.0, 7.0)  # Width and height of the figure, inches
+SIZE = (13.5, 4.0)  # Width and height of the figure, inches
 #: Units of results that a goal may ask to be least.
 UNITS = {"energy": "work of the wheels, J/m", "torque": "torque of a wheel, N m"}
 
 
-def plot_designs(report: DesignReport, ax: Any = None) -> NDArray[Any]:
-    """Draw four panels: probability, margin at the risk, front, shares of the variance.
-
-    The first two show all designs over the first two dimensions that vary, or over the one.
-
-    ax: Four axes of matplotlib; a new figure where None. Returns the axes, (2, 2). Raises
-        `InputError` for another number of axes.
-    """
-    panels = take_axes(ax, 2, 2, SIZE)
-    goal = report.study.goal
-    titles = ("probability of meeting the goal", f"margin at a risk of {goal.risk:g}, N")
-    keys = ("probability", "margin_at_risk_N")
-    for panel, key, title in zip(panels[0], keys, titles, strict=True):
+def _draw_designs(report: DesignReport, axes: Any) -> None:
+    """Draw probability and margin at the risk of all designs, and the front, into three panels."""
+    panels = np.ravel(axes)
+    titles = (
+        "probability of meeting the goal",
+        f"margin at a risk of {report.study.goal.risk:g}, N",
+    )
+    for panel, key, title in zip(panels, ("probability", "margin_at_risk_N"), titles, strict=False):
         _by_size(panel, report, key)
         panel.set_title(title)
-    _front(panels[1, 0], report)
-    _shares(panels[1, 1], report)
-    return panels
+    _front(panels[2], report)
 
 
 def axis_label(name: str) -> str:
@@ -237,14 +229,3 @@ def _front(panel: Any, report: DesignReport) -> None:
     panel.set_ylabel(f"margin at a risk of {report.study.goal.risk:g}, N")
     panel.set_title(f"front: margin against {least.replace('_', ' ')}")
     panel.legend(frameon=False, fontsize=9)
-
-
-def _shares(panel: Any, report: DesignReport) -> None:
-    shares = report.shares[:8][::-1]
-    panel.barh(range(len(shares)), [100.0 * one.share for one in shares], 0.35, color=AFTER)
-    for number, one in enumerate(shares):
-        panel.text(0.0, number + 0.22, one.text, fontsize=9)
-    panel.set_yticks([])
-    panel.set_ylim(-0.4, len(shares) - 0.2)
-    panel.set_xlabel("share of the margin's variance, %")
-    panel.set_title("origin of the margin's spread")

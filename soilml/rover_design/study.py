@@ -61,7 +61,8 @@ class Dimension:
         values: Floats = np.asarray(self.values, dtype=np.float64)
         if self.searched:
             values = np.arange(low, high + 0.5, self.step)
-        return values[np.minimum((fraction * len(values)).astype(int), len(values) - 1)]
+        index = np.minimum((fraction * len(values)).astype(int), len(values) - 1)
+        return np.asarray(values[index])
 
 
 class OpenSize:
@@ -221,8 +222,10 @@ def read_study(path: str | os.PathLike[str], files: NamedFiles | None = None) ->
     settings = read_settings(path, files=files)
     rover = take_declared(_RoverTable, settings.table("rover"))
     wheel = take_declared(_WheelTable, settings.table("wheel"))
+    sizes = {"radius": wheel.radius, "width": wheel.width, "lug_height": wheel.lug_height}
+    sizes |= {"wheels": rover.wheels, "mass": rover.mass}
     study = DesignStudy(
-        {name: getattr(rover, name, getattr(wheel, name, None)) for name in DIMENSIONS},
+        {name: sizes[name] for name in DIMENSIONS},
         rover.wheelbase,
         rover.centre_of_mass,
         rover.gravity,

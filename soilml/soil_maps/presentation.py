@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.quantities import QUANTITIES
-from soilml.report.figure_style import take_axes
 from soilml.report.numbers import format_log_density, pretty, shown_column
 from soilml.report.page import json_text
 from soilml.report.report import Picture, Report
@@ -51,7 +49,7 @@ def report_of_map(found: SoilMap, title: str = "Map of the soil") -> Report:
         tables=[_patches(found), *([_slopes(found)] if found.ability is not None else [])],
         pictures=[
             Picture(
-                "Map", partial(plot_map, found), 2, 2, SIZE, verdict,
+                "Map", partial(_draw_map, found), 2, 2, SIZE, verdict,
                 "White: the path. Crosses: changes of the soil.",
             )
         ],
@@ -144,12 +142,11 @@ def map_files(
     return {folder / name: content for name, content in files.items()}
 
 
-def plot_map(found: SoilMap, ax: Any = None) -> NDArray[Any]:
+def _draw_map(found: SoilMap, axes: Any) -> None:
     """Draw friction angle and its uncertainty, the probability of climbing and the slip needed.
 
-    Without a rover, cohesion and its uncertainty are in the place of the last two. See `take_axes`.
+    Without a rover, cohesion and its uncertainty are in the place of the last two.
     """
-    panels = take_axes(ax, 2, 2, SIZE)
     mean, std = found.moments
     shown: list[tuple[str, Floats, tuple[float | None, float | None]]] = []
     for i in (1, 0)[: 1 if found.ability is not None else 2]:
@@ -163,7 +160,7 @@ def plot_map(found: SoilMap, ax: Any = None) -> NDArray[Any]:
     grid = found.grid
     extent = (grid.west, grid.west + grid.cell * grid.shape[1],
               grid.south, grid.south + grid.cell * grid.shape[0])  # fmt: skip
-    for panel, (title, values, ends) in zip(panels.ravel(), shown, strict=True):
+    for panel, (title, values, ends) in zip(np.ravel(axes), shown, strict=True):
         image = panel.imshow(
             grid.spread(values, found.known), origin="lower", extent=extent, cmap="viridis",
             vmin=ends[0], vmax=ends[1], interpolation="nearest",
@@ -177,4 +174,3 @@ def plot_map(found: SoilMap, ax: Any = None) -> NDArray[Any]:
         panel.set_title(title)
         panel.set_xlabel("x, m")
         panel.set_ylabel("y, m")
-    return panels
