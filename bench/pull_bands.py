@@ -16,7 +16,7 @@ from soilml.io.table import Table
 from soilml.numerics.quantiles import QUANTILES, quantile_band
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
-from soilml.traction import Vehicle, performance, pull_report
+from soilml.traction import DrivenVehicle, performance, pull_report
 from soilml.traction.draws import SoilDraws
 
 #: Soils that nothing was settled with; a load among those driven, and one that is not (N).
@@ -70,7 +70,7 @@ def one_soil(asked: Row) -> list[Row]:
     for load, found in zip(LOADS, report.by_load, strict=True):
         band = found.posterior
         shown = [int(np.argmin(np.abs(band.curve_slip - s))) for s in SLIPS]
-        wheel = Vehicle.of_wheel(world, load)
+        wheel = DrivenVehicle.of_wheel(world, load)
         real = performance(wheel, true, np.zeros(0), band.curve_slip)
         slope = quantile_band(band.steepest_slope)
         rows.append(

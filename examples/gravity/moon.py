@@ -18,7 +18,7 @@ from soilml.physics.soils.gravity_law import LAWS, GravityChange
 from soilml.report.aligned_text import format_table
 from soilml.report.figure_style import save_png
 from soilml.report.tables import Column, ReportTable
-from soilml.traction import Performance, Vehicle, performance
+from soilml.traction import DrivenVehicle, Performance, performance
 from soilml.traction.gravity import draws_at_gravity
 from soilml.traction.measured_range import MeasuredRange, slip_grid
 from soilml.traction.soil_draws import measured_soil
@@ -43,7 +43,7 @@ def answers(case, table) -> dict[str, Performance]:
     """The pull on the Moon by each law, and that on Earth under the same load."""
     draws = measured_soil(case, table).draws
     slips = slip_grid(None, MeasuredRange.of(table["slip"], table["load_N"]))
-    wheel, level = Vehicle.of_wheel(case, LOAD), np.zeros(0)
+    wheel, level = DrivenVehicle.of_wheel(case, LOAD), np.zeros(0)
     earth = performance(wheel, draws, level, slips)
     at = int(np.argmin(np.abs(slips - SLIP)))
     found, lines = {}, []

@@ -32,7 +32,7 @@ from soilml.soil_maps.local_soils import (
     with_exact_sensors,
 )
 from soilml.soil_maps.raster import MapGrid
-from soilml.traction.vehicle import Vehicle
+from soilml.traction.vehicle import DrivenVehicle
 
 if TYPE_CHECKING:
     from soilml.report.report import Report
@@ -189,7 +189,7 @@ def soil_map(
     ------
     InputError
         For a gear or effect that the file is not for, several gears, a cell or reach beyond
-        `SIZES` or without a known cell, and as `Vehicle.check_slopes` does.
+        `SIZES` or without a known cell, and as `DrivenVehicle.check_slopes` does.
     TableError, FitError
         As `read_map_drive`, `follow` and `local_soils` do.
     """
@@ -202,7 +202,7 @@ def soil_map(
         raise InputError("the model file has several gears; a map is of the wheels of one: --gear")
     asked = np.asarray(slopes, dtype=np.float64)
     if case.rover is not None:
-        Vehicle.of_rover(case).check_slopes(asked)
+        DrivenVehicle.of_rover(case).check_slopes(asked)
     own = Estimator.load(MODEL) if estimator is None else estimator
     if own.sets is None:
         raise InputError(f"{own.path} has no set posterior; train it with [set_posterior]")

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.traction.draws import SoilDraws
-from soilml.traction.prediction import Prediction
-from soilml.traction.report import PullReport, pull_report
+from soilml.traction.prediction import TractionPrediction
+from soilml.traction.report import PullReport
 from soilml.traction.soil_draws import prior_draws
-from soilml.traction.vehicle import Performance, Vehicle, performance
+from soilml.traction.vehicle import DrivenVehicle, Performance, performance
+from soilml.traction.workflow import pull_report
 
 #: The name under which `soilml` has it
 pull = pull_report
 
 __all__ = [
+    "DrivenVehicle",
     "Performance",
-    "Prediction",
     "PullReport",
     "QuantileBand",
     "SoilDraws",
-    "Vehicle",
+    "TractionPrediction",
     "performance",
     "prior_draws",
     "pull",

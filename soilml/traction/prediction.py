@@ -18,7 +18,7 @@ from soilml.remarks import Remark
 from soilml.traction.draws import SoilDraws
 from soilml.traction.gravity import gravity_remark
 from soilml.traction.measured_range import MeasuredRange, extrapolations
-from soilml.traction.vehicle import Performance, Vehicle, performance
+from soilml.traction.vehicle import DrivenVehicle, Performance, performance
 
 FEWEST = 0.5  # Share of draws that move below which a vehicle does not
 OVERTURNING = float(np.deg2rad(45.0))  # Slope, rad, beyond which vehicles overturn
@@ -27,10 +27,10 @@ EARTH, OTHER_GRAVITY = GRAVITY["earth"], 0.02
 
 
 @dataclass(frozen=True)
-class Prediction:
+class TractionPrediction:
     """What a vehicle does by the posterior, and on level ground by the prior, with warnings."""
 
-    vehicle: Vehicle
+    vehicle: DrivenVehicle
     posterior: Performance
     prior: Performance
     warnings: tuple[Remark, ...] = ()
@@ -52,13 +52,13 @@ def _width_ratio(posterior: Floats, prior: Floats) -> float:
 
 
 def predicted(
-    vehicle: Vehicle,
+    vehicle: DrivenVehicle,
     draws: SoilDraws,
     prior: SoilDraws,
     slopes: Floats,
     slip: Floats,
     measured: MeasuredRange,
-) -> Prediction:
+) -> TractionPrediction:
     """The prediction of a vehicle by draws of the posterior and of the prior.
 
     slopes, slip: Slopes (q,), rad, and increasing slips (m,).
@@ -67,13 +67,13 @@ def predicted(
     """
     after = performance(vehicle, draws, slopes, slip)
     before = performance(vehicle, prior, np.zeros(0), slip, needed=False)
-    found = Prediction(vehicle, after, before)
+    found = TractionPrediction(vehicle, after, before)
     warnings = prediction_warnings(found, measured, error_included=draws.errors is not None)
     return replace(found, warnings=tuple(warnings))
 
 
 def prediction_warnings(
-    found: Prediction, measured: MeasuredRange, *, error_included: bool
+    found: TractionPrediction, measured: MeasuredRange, *, error_included: bool
 ) -> Iterator[Remark]:
     """Warnings about a prediction.
 

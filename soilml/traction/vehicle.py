@@ -26,7 +26,7 @@ FIRST_SHARES = (0.05, 0.1, 0.2, 0.4, 0.7)
 
 
 @dataclass(frozen=True)
-class Vehicle:
+class DrivenVehicle:
     """Driven wheels that share one slip: those of a rover, or one under its share of a vehicle.
 
     case: Model and soil. Effects of rig and sensors are left out.
@@ -45,7 +45,7 @@ class Vehicle:
     steepest: float = LARGEST_SLOPE
 
     @staticmethod
-    def of_rover(case: Case, speed: float | None = None) -> Vehicle:
+    def of_rover(case: Case, speed: float | None = None) -> DrivenVehicle:
         """The rover of a case at a travel speed, m/s; `InputError` without a rover."""
         rover = case.rover
         if rover is None:
@@ -56,10 +56,14 @@ class Vehicle:
             name: (gears[name], {**others, "pass_number": float(passes[name])})
             for name in rover.wheels
         }
-        return Vehicle(case, rover.weight, wheels, rover.loads, rover.tipping_slope(LARGEST_SLOPE))
+        return DrivenVehicle(
+            case, rover.weight, wheels, rover.loads, rover.tipping_slope(LARGEST_SLOPE)
+        )
 
     @staticmethod
-    def of_wheel(case: Case, load: float, covariates: Mapping[str, float] | None = None) -> Vehicle:
+    def of_wheel(
+        case: Case, load: float, covariates: Mapping[str, float] | None = None
+    ) -> DrivenVehicle:
         """One wheel under a load on level ground, N, of a vehicle whose wheels are all equal.
 
         covariates: Speed, pass number and slip angle, where an effect needs them.
@@ -70,7 +74,7 @@ class Vehicle:
         def loads(slope: Floats) -> Floats:
             return load * np.cos(np.asarray(slope))[None]
 
-        return Vehicle(case, float(load), {"": ("", dict(covariates or {}))}, loads)
+        return DrivenVehicle(case, float(load), {"": ("", dict(covariates or {}))}, loads)
 
     def check_slopes(self, slopes: Floats) -> None:
         """Raise `InputError` for slopes (rad) out of bounds, or where a wheel leaves the ground."""
@@ -103,7 +107,12 @@ class WheelCurves:
 
 
 def wheel_curves(
-    vehicle: Vehicle, draws: SoilDraws, slope: Floats | float, slip: Floats, *, needed: bool = False
+    vehicle: DrivenVehicle,
+    draws: SoilDraws,
+    slope: Floats | float,
+    slip: Floats,
+    *,
+    needed: bool = False,
 ) -> WheelCurves:
     """Curves of a vehicle straight up a slope.
 
@@ -226,7 +235,7 @@ class Performance:
 
 
 def on_slopes(
-    vehicle: Vehicle, draws: SoilDraws, slopes: Floats, slip: Floats
+    vehicle: DrivenVehicle, draws: SoilDraws, slopes: Floats, slip: Floats
 ) -> dict[str, Floats]:
     """Needed slip, margin, energy, torque and sinkage on slopes (q,), by name, (..., n, q).
 
@@ -263,7 +272,7 @@ def _margin(total: Floats, weight: Floats) -> Floats:
 
 
 def performance(
-    vehicle: Vehicle, draws: SoilDraws, slopes: Floats, slip: Floats, *, needed: bool = True
+    vehicle: DrivenVehicle, draws: SoilDraws, slopes: Floats, slip: Floats, *, needed: bool = True
 ) -> Performance:
     r"""Pull, efficiency and sinkage on level ground; slip, margin and work on slopes; the steepest.
 
@@ -316,7 +325,7 @@ def performance(
     )
 
 
-def _steepest(vehicle: Vehicle, draws: SoilDraws, slip: Floats, level: WheelCurves) -> Floats:
+def _steepest(vehicle: DrivenVehicle, draws: SoilDraws, slip: Floats, level: WheelCurves) -> Floats:
     """Steepest slope of each draw, rad (n,); at most the slope where a wheel leaves the ground."""
     share = _largest(level.total_pull) / vehicle.weight
     moving = np.flatnonzero(share > 0.0)

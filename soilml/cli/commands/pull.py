@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     )
     from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
-    from soilml.traction.report import pull_report
+    from soilml.traction import pull_report
 
     if args.picture is not None and args.by is not None:
         raise InputError(

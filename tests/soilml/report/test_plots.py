@@ -11,7 +11,7 @@ from soilml import Estimator, Table, identify, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
 from soilml.gap.results import GapReduction, GapReport
-from soilml.traction.report import pull_report
+from soilml.traction import pull_report
 
 matplotlib = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")

@@ -7,7 +7,7 @@ from remarked import remarked
 from soilml import DrawbarOffset, LoadTransfer, Operating, SlipSinkage
 from soilml.config.case import Case
 from soilml.remarks import texts
-from soilml.traction import SoilDraws, Vehicle, performance, quantile_band
+from soilml.traction import DrivenVehicle, SoilDraws, performance, quantile_band
 from soilml.traction.measured_range import MeasuredRange
 from soilml.traction.prediction import predicted
 
@@ -25,7 +25,7 @@ def with_effect(case, effect):
 
 
 def pulled(case, draws, load, slopes=()):
-    return performance(Vehicle.of_wheel(case, load), draws, np.asarray(slopes), SLIPS)
+    return performance(DrivenVehicle.of_wheel(case, load), draws, np.asarray(slopes), SLIPS)
 
 
 def test_on_the_steepest_slope_the_largest_pull_equals_the_component_of_the_load(case):
@@ -56,7 +56,7 @@ def test_effects_of_the_soil_count_and_those_of_rig_and_sensors_do_not(case):
 
 def known(case, draws, load, slip, measured):
     """A prediction whose prior is its posterior."""
-    return predicted(Vehicle.of_wheel(case, load), draws, draws, np.zeros(0), slip, measured)
+    return predicted(DrivenVehicle.of_wheel(case, load), draws, draws, np.zeros(0), slip, measured)
 
 
 def test_extrapolation_is_reported(case):

@@ -8,7 +8,7 @@ from measured_rows import torque_rows
 
 from soilml import read_case
 from soilml.config.measurement_noise import Discrepancy, Noise
-from soilml.traction import Vehicle, performance
+from soilml.traction import DrivenVehicle, performance
 from soilml.traction.soil_draws import measured_soil
 
 SOIL = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
@@ -40,7 +40,7 @@ def std_at(draws, load):
 
 
 def pulled(case, draws):
-    return performance(Vehicle.of_wheel(case, 60.0), draws, np.zeros(0), SLIP)
+    return performance(DrivenVehicle.of_wheel(case, 60.0), draws, np.zeros(0), SLIP)
 
 
 def test_measured_pulls_tell_the_error_near_them_and_not_far_away(case):

@@ -12,7 +12,7 @@ from soilml.config.measurement_noise import Discrepancy
 from soilml.config.remainder import Remainder, RemainderPart
 from soilml.config.wheeled_rover import RoverWheel, WheeledRover
 from soilml.physics.effects import EFFECTS
-from soilml.traction import Vehicle, performance, pull_report
+from soilml.traction import DrivenVehicle, performance, pull_report
 from soilml.traction.draws import SoilDraws
 
 NAMES = ("cohesion", "friction_angle", "shear_modulus")
@@ -44,7 +44,7 @@ def total_pull(case, slip, slope, number=(1, 1, 2, 2)):
 
 
 def test_at_the_needed_slip_the_wheels_pull_the_weight_along_the_slope(case):
-    found = performance(Vehicle.of_rover(case), draws(), SLOPES, SLIP)
+    found = performance(DrivenVehicle.of_rover(case), draws(), SLOPES, SLIP)
     for slope, slip in zip(SLOPES, found.slip[0], strict=True):
         weight = case.rover.weight * np.sin(slope)
         assert total_pull(case, slip, slope) == pytest.approx(weight, abs=0.005 * case.rover.weight)
@@ -53,17 +53,17 @@ def test_at_the_needed_slip_the_wheels_pull_the_weight_along_the_slope(case):
 
 
 def test_the_steepest_slope_takes_all_the_pull_there_is(case):
-    found = performance(Vehicle.of_rover(case), draws(), SLOPES, SLIP)
+    found = performance(DrivenVehicle.of_rover(case), draws(), SLOPES, SLIP)
     slope = float(found.steepest_slope[0])
     pull = max(total_pull(case, slip, slope) for slip in SLIP)
     assert pull == pytest.approx(case.rover.weight * np.sin(slope), rel=1e-6)
-    beyond = performance(Vehicle.of_rover(case), draws(), np.asarray([slope * 1.01]), SLIP)
+    beyond = performance(DrivenVehicle.of_rover(case), draws(), np.asarray([slope * 1.01]), SLIP)
     assert beyond.climbed[0] == 0.0 and np.isnan(beyond.slip[0, 0]) and beyond.margin[0, 0] < 0.0
 
 
 def passes(case):
     """Pass of each wheel of a rover."""
-    wheels = Vehicle.of_rover(case).wheels
+    wheels = DrivenVehicle.of_rover(case).wheels
     return {name: others["pass_number"] for name, (_, others) in wheels.items()}
 
 
