@@ -199,12 +199,10 @@ def best_design(study: DesignStudy, designs: Designs) -> int:
     Among equals, the one with the larger margin at the goal's risk.
     """
     found = meets(study, designs)
-    margin = designs.results["margin_at_risk_N"]
+    margin, probability = (designs.results[key] for key in ("margin_at_risk_N", "probability"))
     if found.any():
-        keys = (-margin, designs.least_of(study.goal.least), ~found)
-    else:
-        keys = (-margin, -designs.results["probability"])
-    return int(np.lexsort(keys)[0])
+        return int(np.lexsort((-margin, designs.least_of(study.goal.least), ~found))[0])
+    return int(np.lexsort((-margin, -probability))[0])
 
 
 def pareto_front(study: DesignStudy, designs: Designs) -> NDArray[np.int64]:
