@@ -105,8 +105,10 @@ def _designs(found: DesignReport) -> ReportTable:
     of its band.
     """
     goal, designs = found.study.goal, found.designs
-    index = np.linspace(0, len(found.front) - 1, min(len(found.front), MOST_ROWS)).round()
-    numbers = found.front[np.unique(index).astype(int)]
+    numbers, smallest = found.front, designs.least_of(goal.least)[found.front]
+    if len(numbers) > MOST_ROWS:  # those nearest to steps of what is to be least
+        steps = np.linspace(smallest[0], smallest[-1], MOST_ROWS)[:, None]
+        numbers = numbers[np.unique(np.abs(smallest - steps).argmin(axis=1))]
 
     def values(key: str) -> Floats:
         best, others = (
