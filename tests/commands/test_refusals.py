@@ -159,7 +159,6 @@ LINES = {
     "pull model.toml runs.csv --slope 10": "--slope needs a model file with [rover]",
     "pull model.toml runs.csv --by run --picture p.png": "--picture draws one soil",
     "bevameter runs.csv --format json -o soil.toml": "--format json and --out soil.toml differ",
-    "paper climb rover.toml runs.csv --stress runs.csv -o o.json": "is the name of a file",
 }
 
 
