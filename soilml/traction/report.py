@@ -41,7 +41,7 @@ class PullReport(Result):
 
     rows: Number of rows.
     measured_range: Slips and loads of the rows.
-    by_load: TractionPrediction under each load; one for a rover.
+    by_load: Prediction under each load; one for a rover.
     measured_pull: Slip, load (N) and drawbar pull (N) of the k rows that measured it, (k,) each.
     warnings: Those that hold for all.
     of_rover: Whether they are of a rover.
@@ -65,16 +65,7 @@ class PullReport(Result):
         """Medians and ends of 90 % bands, SI units: a row for each load and slip, or each slope."""
         if self.of_rover:
             return _slope_columns(self.by_load[0])
-        return self._of_loads(_curve_columns)
-
-    def _of_loads(self, columns: Callable[[TractionPrediction], dict[str, Any]]) -> dict[str, Any]:
-        """Columns of each load below each other."""
-        parts = []
-        for one in self.by_load:
-            own = columns(one)
-            count = len(next(iter(own.values())))
-            parts.append({"load_N": np.full(count, one.vehicle.weight)} | own)
-        return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+        return _of_loads(self.by_load, _curve_columns)
 
     def report(self, title: str = "Drawbar pull and slopes") -> Report:
         """Largest pull and steepest slope, curves and slopes, and what limits them."""
@@ -115,7 +106,7 @@ class PullReport(Result):
             yield from _table_of_wheels(self.by_load[0])
             return
         yield _table_of_loads(self.by_load)
-        columns = self._of_loads(_curve_columns)
+        columns = _of_loads(self.by_load, _curve_columns)
         kept = [np.arange(len(one.posterior.curve_slip)) % STEP == STEP - 1 for one in self.by_load]
         shown = np.flatnonzero(np.concatenate(kept))
         known = ("load_N", "slip", "drawbar_pull_N", "tractive_efficiency", "sinkage_m")
@@ -131,7 +122,7 @@ class PullReport(Result):
     def _pictures(self) -> list[Picture]:
         several = ("load_N",) if len(self.by_load) > 1 else ()
         slopes = column_picture(
-            _hidden_where_not_climbed(self),
+            _hidden_where_not_climbed(self.by_load),
             "slope_rad",
             [("slip",), ("margin_N",), ("energy_J_per_m",), ("probability_climbed",)],
             several,
@@ -141,7 +132,7 @@ class PullReport(Result):
         if self.of_rover:
             return [slopes]
         slip, load, pull = self.measured_pull
-        columns = self._of_loads(_curve_columns)
+        columns = _of_loads(self.by_load, _curve_columns)
         if not several:
             near = np.abs(load / self.by_load[0].vehicle.weight - 1.0) < SAME_LOAD
             slip, pull = slip[near], pull[near]
@@ -159,6 +150,18 @@ class PullReport(Result):
             measured={"slip": slip, "drawbar_pull_N": pull},
         )
         return [curves, slopes]
+
+
+def _of_loads(
+    loads: Sequence[TractionPrediction], columns: Callable[[TractionPrediction], dict[str, Any]]
+) -> dict[str, Any]:
+    """Columns of each load below each other."""
+    parts = []
+    for one in loads:
+        own = columns(one)
+        count = len(next(iter(own.values())))
+        parts.append({"load_N": np.full(count, one.vehicle.weight)} | own)
+    return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
 
 
 def _curve_columns(one: TractionPrediction) -> dict[str, Any]:
@@ -207,9 +210,9 @@ def _slope_columns(one: TractionPrediction) -> dict[str, Any]:
     return columns
 
 
-def _hidden_where_not_climbed(found: PullReport) -> Mapping[str, Any]:
+def _hidden_where_not_climbed(loads: Sequence[TractionPrediction]) -> Mapping[str, Any]:
     """The columns of slopes, with slip and work blank where hardly any soil lets it climb."""
-    columns = found._of_loads(_slope_columns)
+    columns = _of_loads(loads, _slope_columns)
     enough = columns["probability_climbed"] >= FEWEST
     shown = ("load_N", "slope", "prob", "margin")
     return {
