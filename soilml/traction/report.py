@@ -246,7 +246,7 @@ def _lines(one: TractionPrediction) -> Iterator[str]:
     if own.still_fraction > FEWEST:
         return
     if np.isfinite(own.best_slip).any():
-        best = quantile_band(np.nanmax(own.efficiency, axis=1)).text(digits=2)
+        best = quantile_band(own.best_efficiency).text(digits=2)
         slip = quantile_band(own.best_slip).text()
         yield f"The best slip on level ground is {slip}, with an efficiency of {best}."
     if np.isfinite(one.prior.steepest_slope).any():

@@ -200,8 +200,12 @@ class Performance:
     @property
     def largest_pull(self) -> Floats:
         """The largest drawbar pull of each draw on level ground, N (n,); NaN without one."""
-        largest = _largest(self.pull)
-        return np.where(np.isfinite(largest), largest, np.nan)
+        return _known(_largest(self.pull))
+
+    @property
+    def best_efficiency(self) -> Floats:
+        """The best efficiency of each draw on level ground, (n,); NaN without one."""
+        return _known(_largest(self.efficiency))
 
     @property
     def strongest_slip(self) -> Floats:
@@ -211,8 +215,8 @@ class Performance:
     @property
     def best_slip(self) -> Floats:
         """The slip of the best efficiency on level ground, (n,); NaN where none is above zero."""
-        return np.where(_largest(self.efficiency) > 0.0, self._slip_at_largest(self.efficiency),
-                        np.nan)  # fmt: skip
+        moves = _largest(self.efficiency) > 0.0
+        return np.where(moves, self._slip_at_largest(self.efficiency), np.nan)
 
     @property
     def failed_fraction(self) -> float:
@@ -252,7 +256,7 @@ def on_slopes(
         on_slope.append(
             {
                 "slip": at.of_curve(np.broadcast_to(slip, total.shape)),
-                "margin": _margin(total, weight),
+                "margin": _known(_largest(total)) - weight,
                 "energy": at.of_curve(curves.energy(slip)),
                 "torque": at.of_curve(curves.torque),
                 "sinkage": at.of_curve(curves.sinkage),
@@ -264,11 +268,6 @@ def on_slopes(
 def with_first_slips(slip: Floats) -> Floats:
     """The slips (m,) with some below the first."""
     return np.concatenate([np.asarray(FIRST_SHARES) * slip[0], slip])
-
-
-def _margin(total: Floats, weight: Floats) -> Floats:
-    largest = _largest(total)
-    return np.where(np.isfinite(largest), largest - weight, np.nan)
 
 
 def performance(
@@ -349,6 +348,11 @@ def _steepest(vehicle: DrivenVehicle, draws: SoilDraws, slip: Floats, level: Whe
 def _largest(values: Floats) -> Floats:
     """The largest number of each draw (n,); below any where there is none."""
     return np.asarray(np.nan_to_num(values, nan=-np.inf).max(axis=1))
+
+
+def _known(values: Floats) -> Floats:
+    """The values, with NaN where they are not finite."""
+    return np.where(np.isfinite(values), values, np.nan)
 
 
 @dataclass(frozen=True)

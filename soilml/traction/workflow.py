@@ -26,7 +26,7 @@ from soilml.traction.measured_range import (
 from soilml.traction.prediction import excluded_effects, gravity_remarks, predicted
 from soilml.traction.report import PullReport
 from soilml.traction.soil_draws import measured_soil
-from soilml.traction.vehicle import DrivenVehicle
+from soilml.traction.vehicle import LARGEST_SLOPE, DrivenVehicle
 
 SLOPES = np.deg2rad([0.0, 5.0, 10.0, 15.0, 20.0])  # Slopes that are looked at by default, rad
 #: What no band of one wheel, and none of a rover, includes.
@@ -105,7 +105,8 @@ def pull_report(
     for one in vehicles:
         one.check_slopes(asked)
     slip = slip_grid(slip_limit, measured)
-    reached = [np.ravel(one.loads(np.append(asked, 0.0))) for one in vehicles]
+    ends = [0.0] if of_rover else [0.0, LARGEST_SLOPE]  # between which the steepest one is sought
+    reached = [np.ravel(one.loads(np.append(asked, ends))) for one in vehicles]
     draws, prior = soil.with_errors(slip, np.concatenate(reached).tolist(), CHANNELS)
     if gravity is not None:
         draws, prior = (draws_at_gravity(case, d, gravity) for d in (draws, prior))
