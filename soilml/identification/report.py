@@ -25,7 +25,7 @@ _NOTATION = (
     ("left of prior", "width of the estimate over that of the prior; blank without one."),
 )
 _LEAST_SHARE = 0.01  # Probability of an explanation below which it is not listed
-TO_NEXT = "soilml plan next MODEL.toml RUNS.csv proposes rows that tell what is left open"
+TO_NEXT = "soilml plan next proposes the rows to measure next"
 TO_GAP = "soilml gap finds what a model lacks"
 
 
