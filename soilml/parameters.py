@@ -33,9 +33,13 @@ class Parameter:
     text: str = ""
 
 
-@cache
 def declared(cls: type) -> dict[str, Parameter]:
     """The parameters that a dataclass declares, by field name, in order."""
+    return _declared(cls)
+
+
+@cache
+def _declared(cls: type) -> dict[str, Parameter]:
     hints = get_type_hints(cls, include_extras=True)
     parameters = {}
     for field in fields(cls):
