@@ -227,6 +227,7 @@ def _values(
         "ADAPTED": value(posterior, "normal").shape[1],
         "ROUNDS": int(value(posterior, "rounds").flat[0]),
         "SENSORS": len(SENSOR_ERROR_COLUMNS),
+        "MODEL_ERRORS": len(MODEL_ERROR_COLUMNS),
         "LINEAR": len(zs),
         "ERRORS": len(present),
         "SCALES": len(value(posterior, "scales")),
