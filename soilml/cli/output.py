@@ -33,17 +33,14 @@ def write_columns(
     out: str | None,
     picture: str | None = None,
     drawn: Picture | None = None,
-    others: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> None:
     """Write the columns to the CSV file `out`; without one, print them.
 
     picture: PNG file of `drawn`; None where the option was not given.
-    others: Columns of further CSV files.
     """
     files: dict[Path, Content] = {}
     if out is not None:
         files[Path(out)] = partial(save_columns, columns)
-    files |= {Path(name): partial(save_columns, table) for name, table in (others or {}).items()}
     if picture is not None and drawn is not None:
         files[Path(picture)] = drawn.save
     write_files(files)
@@ -119,15 +116,15 @@ def tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
     write_stdout(f"{ReportTable.of('rows', first | others).text()}\n")
 
 
-def show_result(report: Report, content: Mapping[str, Any]) -> None:
+def show_result(report: Report, content: Mapping[str, Any], details: bool = False) -> None:
     """Print a report as text, or its content as JSON where --format says so.
 
-    -v prints all of it, -q no remarks.
+    -v, or `details`, prints all of it, -q no remarks.
     """
     if SCREEN.form == "json":
         write_stdout(json_text(content))
         return
-    show((replace(report, remarks=()) if SCREEN.quiet else report).text(SCREEN.verbose))
+    show((replace(report, remarks=()) if SCREEN.quiet else report).text(details or SCREEN.verbose))
 
 
 def show(text: str) -> None:

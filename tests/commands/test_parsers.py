@@ -1,11 +1,11 @@
-"""The parsers of all commands: one word has one meaning and one unit; former words still work."""
+"""The parsers of all commands: one word has one meaning and one unit."""
 
 import argparse
 from collections import defaultdict
 
 import pytest
 
-from soilml.cli import main, old_spellings
+from soilml.cli import main
 from soilml.cli.main import COMMANDS, GROUPS, parser
 from soilml.cli.options import leaves
 
@@ -56,34 +56,7 @@ def test_an_option_has_one_meaning_and_one_unit_everywhere():
     assert near == []  # no --load beside --loads
 
 
-@pytest.mark.parametrize("old", old_spellings.COMMANDS)
-def test_former_commands_lead_to_present_ones(old):
-    assert old not in PARSERS
-    words = old_spellings.present_words([old, "--help"])
-    assert " ".join(words[:-1]) in PARSERS
-
-
-@pytest.mark.parametrize("command", old_spellings.OPTIONS)
-def test_former_options_lead_to_present_ones(command):
-    for old, new in old_spellings.OPTIONS[command].items():
-        assert old not in options(command) and new in options(command)
-        before = [*command.split(), "in", old, "x", f"{old}=y"]
-        assert old_spellings.present_words(before) == [*command.split(), "in", new, "x", f"{new}=y"]
-        assert main([*command.split(), old, "x", new, "y"]) == 2
-
-
-def test_hints_at_former_words_are_for_a_terminal(monkeypatch, capsys):
-    old_spellings.present_words(["advise", "--loads", "3"])
-    assert capsys.readouterr().err == ""
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    old_spellings.present_words(["advise", "--loads", "3"])
-    assert capsys.readouterr().err == (
-        "! `soilml advise` is now `soilml plan next`\n! --loads is now --load\n"
-    )
-
-
 def test_every_command_explains_itself_with_an_example():
     for name, own in PARSERS.items():
         assert isinstance(own, argparse.ArgumentParser) and own.description.strip()
-        own_example = any(f"soilml {name}" in own.description for _ in "x")
-        assert own_example or name == "setup check", name
+        assert f"soilml {name}" in own.description or name == "setup check", name

@@ -32,10 +32,8 @@ PLATES = "test,plate_radius_m,sinkage_m,load_N\n" + "".join(
 )
 LINEAR = str(ROOT / "exported/wheel_linear.onnx")
 WORDS = {
-    "show models": [],
     "setup check": [],
-    "show soils": [],
-    "show effects": [],
+    "show": ["soils"],
     "simulate": ["m.toml", "--slip", "0.1,0.5", "--load", "60,1e6", "--speed", "0.1"],
     "identify": ["m.toml", "runs.csv", "--by", "run"],
     "bevameter": ["plates.csv"],

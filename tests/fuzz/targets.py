@@ -221,8 +221,8 @@ words = st.lists(
     max_size=9,
 )  # fmt: skip
 commands = st.sampled_from(
-    ["simulate", "identify", "audit", "estimate", "generate", "soils", "effects", "bevameter",
-     "advise", "pull", "climb", "train", "export-c", "compare"]
+    ["simulate", "identify", "gap", "estimate", "generate", "show", "plan", "bevameter",
+     "import", "pull", "paper", "train", "export", "compare"]
 )  # fmt: skip
 slips, loads = (st.lists(near(*ends), min_size=3, max_size=3) for ends in ((-1, 1), (1, 1e3)))
 torques = st.lists(near(-10.0, 50.0), min_size=3, max_size=3)

@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal as scipy_signal
 
-from soilml.systems.tracked_robot.signals import (
-    low_pass,
-    stationary_mean,
-)
+from soilml.systems.tracked_robot import low_pass, stationary_mean
 
 RATE = 100.0
 
