@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
 from soilml import __version__
+from soilml.cli.old_spellings import present_words
 from soilml.cli.options import declare, declared_outputs, input_files, need_for_options
 from soilml.cli.process import (
     StopSignals,
@@ -246,11 +247,12 @@ def _run(arguments: Sequence[str] | None, signals: StopSignals) -> int:
 
 def _status(words: list[str]) -> int:
     """Run the command of these words; returns the exit status."""
-    words = words or ["--help"]
+    typed = words or ["--help"]
+    words = present_words(typed)
     if empty := [word for word in words if word.startswith("--") and word.endswith("=--")]:
         raise InputError(f"{empty[0]}: needed is a value after the equals sign")
     args = parser(words).parse_args(words)
-    args.command_line, args.make_parser = words, parser
+    args.command_line, args.make_parser = typed, parser
     SCREEN.choose(getattr(args, "format", None), args.quiet, args.verbose)
     check_outputs(args.outputs(args), input_files(args))
     check_memory_limit()

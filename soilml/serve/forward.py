@@ -228,7 +228,7 @@ def _case(request: dict[str, Any]) -> Case:
         for key, first in (("model", ""), ("wheel", "wheel"), ("soil", FIRST_SOIL))
     )
     if isinstance(text, str) and text.strip():
-        case = _case_of_text(text)
+        case = case_of_text(text)
     else:
         if not isinstance(gear, str) or gear not in GEARS:
             raise InputError(f"no wheel {gear!r}; there are: {', '.join(GEARS)}")
@@ -243,7 +243,7 @@ def _case(request: dict[str, Any]) -> Case:
 
 
 @lru_cache(maxsize=16)
-def _case_of_text(text: str) -> Case:
+def case_of_text(text: str) -> Case:
     """The case of the text of a model file; errors name `MODEL_FILE`."""
     with tempfile.TemporaryDirectory(prefix="soilml-model-") as folder:
         path = Path(folder) / MODEL_FILE

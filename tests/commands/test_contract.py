@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from conftest import RECIPE
+from conftest import MODEL, RECIPE
 from console import printed, rows_of, rows_printed
 
 from soilml.cli import main
@@ -63,6 +63,18 @@ def test_identify_finds_the_model_s_own_soil(model_file, runs_file, tmp_path, ca
     assert content["parameters"]["friction_angle"]["unit"] == "rad"
     assert set(content) >= {"method", "parameters", "correlation", "warnings", "rows_used"}
     assert json.loads(printed([*command[:-2], "--format", "json"], capsys).out) == content
+
+
+def test_identify_takes_the_rows_of_one_gear(workplace, model_file, capsys):
+    gear = MODEL.partition("[soil]")[0]
+    two = (gear.replace("[gear]", f"[gears.{name}]") for name in ("narrow", "wide"))
+    model_file.write_text(MODEL.replace(gear, "\n".join(two)))
+    lines = ("run,gear,slip,load_N,torque_Nm", "a,narrow,0.1,60,1", "b,wide,0.2,60,2")
+    (workplace / "runs.csv").write_text("\n".join(lines) + "\n")
+    words = ["identify", model_file, "runs.csv", "--method", "nonlinear", "--free", "cohesion"]
+    by_option = printed([*words, "--gear", "narrow"], capsys).out
+    assert printed([*words, "--where", "gear=narrow"], capsys).out == by_option
+    assert by_option.startswith("1 row ")
 
 
 @pytest.mark.slow

@@ -3,9 +3,7 @@
 import argparse
 from collections import defaultdict
 
-import pytest
-
-from soilml.cli import main
+from soilml.cli import main, old_spellings
 from soilml.cli.main import COMMANDS, GROUPS, parser
 from soilml.cli.options import leaves
 
@@ -31,10 +29,10 @@ def test_a_bare_word_prints_at_most_twenty_commands_in_eighty_columns(capsys, mo
     assert set(COMMANDS) == set(PARSERS) and set(COMMANDS) <= named
 
 
-@pytest.mark.parametrize("name", PARSERS)
-def test_help_fits_eighty_columns(name, monkeypatch):
+def test_help_fits_eighty_columns(monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    assert max(map(len, PARSERS[name].format_help().splitlines())) <= 80
+    for name, own in PARSERS.items():
+        assert max(map(len, own.format_help().splitlines())) <= 80, name
 
 
 def test_an_option_has_one_meaning_and_one_unit_everywhere():
@@ -54,6 +52,33 @@ def test_an_option_has_one_meaning_and_one_unit_everywhere():
     )
     near = [o for o in kinds if f"{o}s" in kinds and o not in ("--set", "--wheel")]
     assert near == []  # no --load beside --loads
+
+
+def test_former_commands_lead_to_present_ones():
+    for old in old_spellings.COMMANDS:
+        assert old not in PARSERS
+        words = old_spellings.present_words([old, "--help"])
+        assert {words[0], " ".join(words[:-1])} & PARSERS.keys(), old
+
+
+def test_former_options_lead_to_present_ones():
+    former = [(c, *pair) for c, own in old_spellings.OPTIONS.items() for pair in own.items()]
+    for command, old, new in former:
+        words = command.split()
+        assert old not in options(command) and new in options(command)
+        said = old_spellings.present_words([*words, "in", old, "x", f"{old}=y"])
+        assert said == [*words, "in", new, "x", f"{new}=y"]
+        assert main([*words, old, "x", new, "y"]) == 2
+
+
+def test_hints_at_former_words_are_for_a_terminal(monkeypatch, capsys):
+    old_spellings.present_words(["advise", "--loads", "3"])
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    old_spellings.present_words(["advise", "--loads", "3"])
+    assert capsys.readouterr().err == (
+        "! `soilml advise` is now `soilml plan next`\n! --loads is now --load\n"
+    )
 
 
 def test_every_command_explains_itself_with_an_example():

@@ -59,7 +59,7 @@ def results(folder):
     return {
         "identify": identify(model, runs, method="posterior"),
         "gap": gap(str(model), runs),
-        "pull": pull(model, runs, loads=[60.0]),
+        "pull": pull(model, runs, loads=[60.0], exact_model=True),
         "advise": advise(model, runs, count=1),
         "estimate": estimator.run(slip=[0.1, 0.3], torque=[1.6, 2.7], load=[60.0] * 2),
     }
