@@ -14,8 +14,8 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.errors import InputError, SoilmlError
 from soilml.io.table import TEXT, Table, text_column
-from soilml.log_import.guesses.columns import parts_of, words_of
 from soilml.log_import.guesses.constants import agreed_constants, stated_radius
+from soilml.log_import.guesses.role_words import parts_of, words_of
 from soilml.log_import.readers import read_log
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import dimension, factor, unit_in_name

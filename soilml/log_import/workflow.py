@@ -12,7 +12,7 @@ from soilml.errors import FitError, InputError
 from soilml.io.table import Table
 from soilml.log_import.channels.runs import runs_of, runs_of_rows
 from soilml.log_import.channels.wheel_quantities import largest_errors, wheels_by_gear
-from soilml.log_import.guesses.columns import is_size
+from soilml.log_import.guesses.role_words import is_size
 from soilml.log_import.mapping.log_map import LogMap, map_from, read_map
 from soilml.log_import.readers import Progress, read_logs, silent
 from soilml.log_import.readers.side_files import log_files
