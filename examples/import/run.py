@@ -11,7 +11,7 @@ from rig import write_logs
 
 from soilml.cli import main
 from soilml.log_import import import_log
-from soilml.log_import.figures import draw_over_slip, draw_run, panels_over_slip, run_panels
+from soilml.log_import.import_report import draw_over_slip, draw_run, panels_over_slip, run_panels
 from soilml.report.figure_style import report_style
 
 FOLDER = Path("demo/import")

@@ -58,7 +58,6 @@ class WheelSeries:
     """The quantities of one wheel in one run over time, and the stretches of the run."""
 
     run: str  # Name of the run in the table
-    drive: str  # Name of the run in the log; several wheels share it
     time: Floats  # Grid (n,), s
     quantities: dict[str, Floats]  # Samples (n,) by name
     stretches: tuple[Stretch, ...]  # Steady windows and what is left out
@@ -72,12 +71,21 @@ def by_name(dictionaries: Sequence[Mapping[str, float]]) -> dict[str, Floats]:
 
 
 def window_row(
-    window: Stretch, inputs: Inputs, series: Mapping[str, Floats], run: Run, conversion: Conversion
+    window: Stretch,
+    inputs: Inputs,
+    series: Mapping[str, Floats],
+    run: Run,
+    conversion: Conversion,
+    within: Stretch | None = None,
 ) -> WindowRow:
-    """The row of a window; `series` are the quantities over time."""
+    """The row of a window; `series` are the quantities over time.
+
+    Sensors are averaged over the part `within` it, else over all of it; slip is that of all of it.
+    """
     rows = inputs.within(window.start, window.stop)
+    part = rows if within is None else inputs.within(within.start, within.stop)
     means = {
-        role: float(np.nanmean(values[rows])) if np.isfinite(values[rows]).any() else float("nan")
+        role: float(np.nanmean(values[part])) if np.isfinite(values[part]).any() else float("nan")
         for role, values in inputs.values.items()
     } | inputs.constants
     slip_error = _exact_speeds(means, inputs, rows, conversion)
@@ -89,8 +97,8 @@ def window_row(
         # s = 1 - k driving, 1 / k - 1 braking
         std["slip"] = slip_error * (1.0 if values["slip"] >= 0.0 else (1.0 + values["slip"]) ** 2)
     for name in AVERAGED:
-        if name in series and series[name].ndim and np.isfinite(series[name][rows]).any():
-            mean, error, _ = mean_error(series[name][rows], inputs.step)
+        if name in series and series[name].ndim and np.isfinite(series[name][part]).any():
+            mean, error, _ = mean_error(series[name][part], inputs.step)
             if error > 1e-12 * abs(mean):
                 std[name] = error
     sizes = {name: float(np.nanmedian(v)) for name, v in _carried(run).items()}

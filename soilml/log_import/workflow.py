@@ -94,7 +94,7 @@ def import_recordings(
     wrong = [hint for wheel in wheels for hint in wheel.hints()]
     if wrong and not accept:
         raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
-    groups = [(w.wheel, run, w.kept[k]) for run, w, k in by_run]
+    groups = [(w.wheel, run, w.runs[k].kept) for run, w, k in by_run]
     table = rows_as_table(groups, found.source, timed=not steady)
     remarks = [remark for wheel in wheels for remark in wheel.remarks()]
     if len(table) == 0:
@@ -122,7 +122,7 @@ def import_recordings(
 def _most_frequent(wheels: Sequence[WheelRows]) -> str:
     """The reason for which most of the time was left out."""
     seconds: dict[Remark | None, float] = {}
-    for s in (s for wheel in wheels for own in wheel.stretches for s in own):
+    for s in (s for wheel in wheels for one in wheel.runs for s in one.stretches):
         seconds[s.why] = seconds.get(s.why, 0.0) + s.stop - s.start
     most = max(seconds, key=lambda why: seconds[why], default=None)
     return most.text if most else "the logs are empty"

@@ -19,10 +19,8 @@ from soilml.log_import.channels.resampling import (
     on_grid,
     sampling_interval,
     unwrapped,
-    without_spikes,
 )
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.channels.wheel_quantities import slope_of
 from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.windows.mean_errors import mean_error
@@ -32,8 +30,6 @@ SMOOTH = 0.5  # Span of the derivative of places and angles, s
 #: Share of the usual rotation speed below which a wheel stands still; shortest rest, and what is
 #: left out before the start, s.
 _STANDS, _SHORTEST_REST, _BEFORE_START = 0.05, 0.4, 0.2
-#: Channels of a wheel-leg in which single wild samples are left out.
-_DESPIKED = ("torque", "motor_current", "load", "drawbar_pull", "sinkage", "clearance", "vibration")
 #: Roles that are places, and the role of their rate.
 _PLACES = {"wheel_angle": "wheel_speed", "position": "ground_speed"}
 _EFFORT = 0.1  # Share of the usual torque or current that is more than noise and offset
@@ -106,13 +102,6 @@ def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
         channel = wheel.channels[role]
         if channel.unwrap:
             several = [(t, unwrapped(v, channel.unwrap)) for t, v in several]
-        if wheel.leg is not None and role in _DESPIKED:
-            # single wild samples, which the largest acceleration of a stance would be
-            found = [(times, *without_spikes(values)) for times, values in several]
-            if count := sum(wild for *_, wild in found):
-                text = f"[{role}]: {count} single wild samples are left out"
-                inputs.notes.append(Remark("spikes", text, (role,), severity="note"))
-            several = [(times, values) for times, values, _ in found]
         rate = _PLACES.get(role)
         sampled = [on_grid(grid, t, v, continuous=rate is not None) for t, v in several]
         if rate is None:
@@ -131,8 +120,6 @@ def combined(channel: ChannelMap, columns: list[Floats]) -> Floats:
 
     Cells that carry the wheel together add up, sensors of one sinkage are averaged.
     """
-    if channel.role == "slope":
-        return channel.scale * slope_of(columns)
     total = channel.scale * sum(columns[1:], start=columns[0])
     if channel.role == "slip":
         total = our_slip(total, channel.definition)

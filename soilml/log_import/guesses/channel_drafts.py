@@ -31,9 +31,6 @@ from soilml.log_import.mapping.channel_map import GEARED, ROLES, SLIP_DEFINITION
 from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import dimension, is_raw_signal
 
-#: Radius of the wheels of rovers and rigs, m: the usual one, and its range.
-_USUAL_RADIUS, _RADII = 0.12, (0.02, 0.6)
-_ROTATIONS = {"rad/s": 1.0, "rpm": math.pi / 30.0, "deg/s": math.pi / 180.0}
 #: Masses that a scale shows, as forces; any other is taken for kg.
 _AS_FORCE = {"g": "gf", "gram": "gf", "grams": "gf", "lb": "lbf", "pound": "lbf", "pounds": "lbf"}
 _FAR_IN_M = 4.0  # A height of so many m is rather one in mm
@@ -69,15 +66,10 @@ def draft_channels(
     `parts` are the further columns of a role: y and z, where the chosen place is x.
     """
     drafts = {r: _draft(r, column, run, stated, parts.get(r, ())) for r, column in chosen.items()}
-    rotation, ground = drafts.get("wheel_speed"), drafts.get("ground_speed")
-    radius = stated_radius(stated)
-    if rotation and ground and not rotation.stated_unit:
-        size = {"mm/s": 1e-3, "cm/s": 1e-2}.get(ground.keys["unit"], 1.0) * ground.column.size
-        rotation.put("unit", *_rotation_unit(rotation.column.size, size, radius))
     if (inputs := inputs_of(drafts, run, steady)) is not None:
         put_signs(drafts, inputs)
         put_tares(drafts, inputs)
-        put_zero_of_sinkage(drafts, inputs, radius)
+        put_zero_of_sinkage(drafts, inputs, stated_radius(stated))
     return drafts
 
 
@@ -85,7 +77,7 @@ def _draft(
     role: str, column: Candidate, run: Run, stated: Stated, more: Sequence[Candidate]
 ) -> Draft:
     """The table of a channel; `more` are its other columns: y and z of a place, further cells."""
-    draft = Draft(column=column)
+    draft = Draft(column=column, role=role)
     all_ = [c.address for c in (column, *more)]
     draft.put("column", all_ if more else all_[0], _SEVERAL.get(role, "") if more else "")
     columns = [values[np.isfinite(values)] for values in (run.find(c)[1] for c in all_)]
@@ -160,21 +152,6 @@ def _unit(role: str, column: Candidate, size: float) -> tuple[str, str]:
     units = USUAL[role].sizes
     why = "not stated; by the size of the values" if len(units) > 1 else "not stated"
     return next(unit for least, unit in units if size >= least), why
-
-
-def _rotation_unit(rotation: float, travel: float, radius: float) -> tuple[str, str]:
-    """Unit of a rotation rate of this size beside a travel speed (m/s), and why.
-
-    Each unit implies a radius at which nothing slips. That of the map, or a usual one, decides.
-    """
-    if not (rotation > 0.0 and travel > 0.0):
-        return "rad/s", "not stated"
-    wanted = 0.8 * (radius if radius > 0.0 else _USUAL_RADIUS)
-    implied = {unit: travel / (rotation * factor) for unit, factor in _ROTATIONS.items()}
-    unit = min(implied, key=lambda u: abs(math.log(implied[u] / wanted)))
-    if not _RADII[0] < implied[unit] < _RADII[1]:
-        return "rad/s", "not stated; no unit fits the travel, so that a gearbox may lie between"
-    return unit, f"not stated; it would fit a radius of {implied[unit]:.2g} m or more"
 
 
 def _put_gear_ratio(

@@ -36,9 +36,41 @@ _FEWEST = 6  # Fewest means that tell a correlation
 
 @dataclass
 class Draft(WrittenTable):
-    """The table of one channel, and the column that it is guessed to be."""
+    """The table of one channel, the column that it is guessed to be, and what speaks for it."""
 
     column: Candidate = field(kw_only=True)
+    role: str = field(kw_only=True)
+    word: bool = False  # Whether a full word of the role is in the name
+    rival: str = ""  # A column of other values whose name says as much; "" for none
+    second: str = ""  # The column that would be the next one; "" for none
+    physics: str = ""  # What other channels say for it and against it
+    against: str = ""
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether the channel needs no mark: the one rule."""
+        proved = bool((self.stated_unit and self.word) or self.physics)
+        return proved and not (self.against or self.rival)
+
+    @property
+    def mark(self) -> str:
+        """What the mark says, and which column might be meant otherwise."""
+        lacks = {"its name alone does not say so": self.word,
+                 "no unit is stated": self.stated_unit}  # fmt: skip
+        why = self.against or ", and ".join(text for text, there in lacks.items() if not there)
+        if not why:
+            return f"CHANGE: {self.rival!r} fits as well"
+        return f"CHANGE: {why}" + (f"; else perhaps {self.second!r}" if self.second else "")
+
+    @property
+    def evidence(self) -> str:
+        """What speaks for the column, as lines of text."""
+        return (
+            f"[{self.role}] {self.column.address}: {'no mark' if self.is_silent else self.mark}\n"
+            f"    unit {self.stated_unit or 'not stated'}; "
+            f"{'a' if self.word else 'no'} full word of the role in the name; "
+            f"physics: {self.against or self.physics or 'nothing confirms it'}\n"
+        )
 
     @property
     def stated_unit(self) -> str:
@@ -56,7 +88,7 @@ class Draft(WrittenTable):
         """The draft as a table of another path, with some of its keys."""
         kept = {key: value for key, value in self.keys.items() if key in keys}
         after = self.after if "column" in kept else []
-        return Draft(path, kept, self.comments, after=after, column=self.column)
+        return Draft(path, kept, self.comments, after=after, column=self.column, role=self.role)
 
 
 def wheel_of(drafts: Mapping[str, Draft], radius: float | None) -> WheelMap:

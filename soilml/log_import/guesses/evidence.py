@@ -15,8 +15,8 @@ from soilml.arrays import Floats
 from soilml.log_import.channels.inputs import Inputs
 from soilml.log_import.channels.wheel_quantities import Conversion
 from soilml.log_import.checks.checked_rows import RowsToCheck, other_units
-from soilml.log_import.checks.row_hints import TRACTION, hints_of
-from soilml.log_import.checks.slip_hints import FASTEST
+from soilml.log_import.checks.row_checks import TRACTION, hints_of
+from soilml.log_import.checks.slip_checks import FASTEST
 from soilml.log_import.guesses.columns import Candidate
 from soilml.log_import.guesses.draft import (
     Draft,
@@ -44,43 +44,6 @@ _PAIRS = (("torque", "drawbar_pull"), ("motor_current", "drawbar_pull"), ("torqu
 _OF_NO_MAP = ("odd-row", "constant-reading")  # Hints that doubt rows and sensors
 
 
-@dataclass
-class GuessEvidence:
-    """What speaks for a column in a role."""
-
-    role: str
-    column: str
-    unit: str  # The stated unit; "" where it was guessed
-    word: bool  # Whether a full word of the role is in the name
-    rival: str  # A column of other values whose name says as much; "" for none
-    second: str  # The column that would be the next one; "" for none
-    physics: str = ""  # What other channels say for it and against it
-    against: str = ""
-
-    @property
-    def silent(self) -> bool:
-        """Whether the channel needs no mark: the one rule."""
-        proved = bool((self.unit and self.word) or self.physics)
-        return proved and not (self.against or self.rival)
-
-    @property
-    def mark(self) -> str:
-        """What the mark says, and which column might be meant otherwise."""
-        lacks = {"its name alone does not say so": self.word, "no unit is stated": self.unit}
-        why = self.against or ", and ".join(text for text, there in lacks.items() if not there)
-        if not why:
-            return f"CHANGE: {self.rival!r} fits as well"
-        return f"CHANGE: {why}" + (f"; else perhaps {self.second!r}" if self.second else "")
-
-    def __str__(self) -> str:
-        return (
-            f"[{self.role}] {self.column}: {'no mark' if self.silent else self.mark}\n"
-            f"    unit {self.unit or 'not stated'}; "
-            f"{'a' if self.word else 'no'} full word of the role in the name; "
-            f"physics: {self.against or self.physics or 'nothing confirms it'}\n"
-        )
-
-
 @dataclass(frozen=True)
 class Judge:
     """What is known of a wheel beside its channels.
@@ -100,13 +63,14 @@ class Judge:
     shown: Mapping[str, str]
     over_time: bool
 
-    def weigh(self, drafts: Mapping[str, Draft], inputs: Inputs | None) -> list[GuessEvidence]:
-        """The evidence for each channel of a wheel; those without are marked in their drafts.
+    def weigh(self, drafts: Mapping[str, Draft], inputs: Inputs | None) -> None:
+        """Weigh the evidence for each channel of a wheel; those without are marked.
 
         inputs: Samples as the drafts read them; None where they cannot be read.
         """
         used = {draft.column.address for draft in drafts.values()}
-        found = {role: self._stated(role, draft, used) for role, draft in drafts.items()}
+        for draft in drafts.values():
+            self._weigh_alone(draft, used)
         if inputs is not None:
             means = driving_means(inputs)
             marked = {role for role, why in self.shown.items() if isinstance(why, Marked)}
@@ -115,39 +79,34 @@ class Judge:
             for roles, why in self._doubts(drafts, means, implied):
                 # what a channel that is marked already explains is doubted no more
                 for role in roles if marked.isdisjoint(roles) else ():
-                    found[role].against = found[role].against or why
+                    drafts[role].against = drafts[role].against or why
             for role, why in (
-                *self._by_speeds(found, drafts, travel_over_rotation(means)),
-                *self._by_load(found, drafts, means, self._radius(implied)),
-                *_by_behaviour(found, drafts, means),
+                *self._by_speeds(drafts, travel_over_rotation(means)),
+                *self._by_load(drafts, means, self._radius(implied)),
+                *_by_behaviour(drafts, means),
             ):
-                found[role].physics = found[role].physics or why
+                drafts[role].physics = drafts[role].physics or why
             never_rests = self.over_time and inputs.speed is not None and not inputs.rest
-            for role in (role for role in found if USUAL[role].zero and never_rests):
+            for role in (role for role in drafts if USUAL[role].zero and never_rests):
                 why = "the wheel never rests in the log, so that nothing shows where its zero is"
-                found[role].against = found[role].against or why
-        for role, one in found.items():
-            comments = drafts[role].comments
-            said = comments.get("column", "")
-            if not one.silent and not isinstance(said, Marked):
-                comments["column"] = Marked(f"{one.mark}; {said}" if said else one.mark)
-        return list(found.values())
+                drafts[role].against = drafts[role].against or why
+        for draft in drafts.values():
+            said = draft.comments.get("column", "")
+            if not draft.is_silent and not isinstance(said, Marked):
+                draft.comments["column"] = Marked(f"{draft.mark}; {said}" if said else draft.mark)
 
-    def _stated(self, role: str, draft: Draft, used: set[str]) -> GuessEvidence:
+    def _weigh_alone(self, draft: Draft, used: set[str]) -> None:
         """What name, unit and values of a column alone say."""
-        own, others = draft.column, self.seconds.get(role, ())
+        own, role = draft.column, draft.role
+        others = self.seconds.get(role, ())
         alike = [c for c in self.columns if c.kind == UNITS[role] and not c.constant]
         left = [c.address for c in (*others, *alike) if c.address not in used]
-        named = says_role(role, own.name) or says_role(role, own.address)
-        second = left[0] if left else ""
-        found = GuessEvidence(
-            role, own.address, draft.stated_unit, named, _rival(role, own, others), second
-        )
-        if role in self.shown and not isinstance(self.shown[role], Marked) and found.unit:
-            found.physics = self.shown[role]
+        draft.word = says_role(role, own.name) or says_role(role, own.address)
+        draft.rival, draft.second = _rival(role, own, others), left[0] if left else ""
+        if role in self.shown and not isinstance(self.shown[role], Marked) and draft.stated_unit:
+            draft.physics = self.shown[role]
         if own.constant and role not in _SET:
-            found.against = f"it reads {own.middle:.3g} throughout"
-        return found
+            draft.against = f"it reads {own.middle:.3g} throughout"
 
     def _doubts(
         self, drafts: Mapping[str, Draft], means: Mapping[str, Floats], implied: float
@@ -164,12 +123,10 @@ class Judge:
         """The radius as stated, else the largest travel over rotation; 0 where no wheel has it."""
         return self.radius or (implied if _RADII[0] < implied < _RADII[1] else 0.0)
 
-    def _by_speeds(
-        self, found: Mapping[str, GuessEvidence], drafts: Mapping[str, Draft], ratio: Floats
-    ) -> Iterator[tuple[str, str]]:
+    def _by_speeds(self, drafts: Mapping[str, Draft], ratio: Floats) -> Iterator[tuple[str, str]]:
         """Roles that travel over rotation (n,) confirms, and how."""
-        turning = next((r for r in ROTATIONS if r in found), "")
-        travel = next((r for r in TRAVELS if r in found), "")
+        turning = next((r for r in ROTATIONS if r in drafts), "")
+        travel = next((r for r in TRAVELS if r in drafts), "")
         # the ratio of two measurements has some scatter
         scatters = ratio.size and (ratio.size < 3 or np.ptp(ratio) > 1e-9 * ratio.max())
         if not (turning and travel and scatters):
@@ -183,26 +140,22 @@ class Judge:
             def fits(size: float) -> bool:
                 return FASTEST[0] < high / radius * size < FASTEST[1]
 
-            one_unit = _only_unit(found[turning], drafts, lambda x: fits(1.0 / x))
-            one_unit = one_unit and _only_unit(found[travel], drafts, fits)
+            one_unit = _only_unit(drafts[turning], lambda x: fits(1.0 / x))
+            one_unit = one_unit and _only_unit(drafts[travel], fits)
             if _SLIPS[0] < slips[0] and slips[1] < _SLIPS[1] and one_unit:
                 yield from ((role, f"slip is {slips[0]:.2g} to {slips[1]:.2g}") for role in both)
-        elif _RADII[0] < high < _RADII[1] and all(found[role].unit for role in both):
+        elif _RADII[0] < high < _RADII[1] and all(drafts[role].stated_unit for role in both):
             why = f"travel over rotation is {high:.2g} m, as of a wheel"
             yield from ((role, why) for role in both)
 
     def _by_load(
-        self,
-        found: Mapping[str, GuessEvidence],
-        drafts: Mapping[str, Draft],
-        means: Mapping[str, Floats],
-        radius: float,
+        self, drafts: Mapping[str, Draft], means: Mapping[str, Floats], radius: float
     ) -> Iterator[tuple[str, str]]:
         """Whether a stated mass confirms the load, and it and the torque each other."""
         size = float(np.nanmedian(np.abs(means["load"]))) if "load" in means else 0.0
         if size and self.weight and _OF_MASS[0] < size / self.weight[1] < _OF_MASS[1]:
             yield "load", f"the stated mass gives {self.weight[1]:.3g} N, and it shows {size:.3g} N"
-        if not size or "torque" not in means or "torque" not in found:
+        if not size or "torque" not in means or "torque" not in drafts:
             return
         lever = float(np.nanmedian(np.abs(means["torque"]))) / size
         low, high = (r * radius for r in TRACTION) if radius else _USUAL_LEVER
@@ -211,30 +164,34 @@ class Judge:
             def fits(x: float, power: int = power) -> bool:
                 return low < lever * x**power < high
 
-            if role not in found or not fits(1.0) or (other in found and not found[other].unit):
+            if (
+                role not in drafts
+                or not fits(1.0)
+                or (other in drafts and not drafts[other].stated_unit)
+            ):
                 continue
-            alone = found[role].unit and sum(c.kind == UNITS[role] for c in self.columns) == 1
-            if (found[role].word or alone) and _only_unit(found[role], drafts, fits):
+            alone = (
+                drafts[role].stated_unit and sum(c.kind == UNITS[role] for c in self.columns) == 1
+            )
+            if (drafts[role].word or alone) and _only_unit(drafts[role], fits):
                 yield role, f"torque over load is {lever:.2g} m, as of a wheel"
 
 
-def _only_unit(
-    one: GuessEvidence, drafts: Mapping[str, Draft], fits: Callable[[float], bool]
-) -> bool:
+def _only_unit(draft: Draft, fits: Callable[[float], bool]) -> bool:
     """Whether the unit is stated, or none of the others that loggers write fits as well."""
-    others = other_units(one.role, str(drafts[one.role].keys.get("unit", "")))
-    return bool(one.unit) or not any(map(fits, others.values()))
+    others = other_units(draft.role, str(draft.keys.get("unit", "")))
+    return bool(draft.stated_unit) or not any(map(fits, others.values()))
 
 
 def _by_behaviour(
-    found: Mapping[str, GuessEvidence], drafts: Mapping[str, Draft], means: Mapping[str, Floats]
+    drafts: Mapping[str, Draft], means: Mapping[str, Floats]
 ) -> Iterator[tuple[str, str]]:
     """Channels that vary together, and a slip of a size that only one unit gives."""
     for pair in _PAIRS:
         if abs(correlation(means, *pair)) > _TOGETHER:
             why = f"{' and '.join(pair).replace('_', ' ')} vary together"
-            yield from ((r, why) for r in pair if r in found and found[r].unit)
-    if "slip" in means and "slip" in found and found["slip"].word:
+            yield from ((r, why) for r in pair if r in drafts and drafts[r].stated_unit)
+    if "slip" in means and "slip" in drafts and drafts["slip"].word:
         low, high = float(np.nanmin(means["slip"])), float(np.nanmax(means["slip"]))
         given = 100.0 * high if drafts["slip"].keys.get("unit") == "%" else high
         known = 0.02 < given <= MOST_FRACTION or given >= _SURELY_PERCENT

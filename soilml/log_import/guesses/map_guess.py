@@ -7,21 +7,19 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from soilml.io.toml_text import toml_key
+from soilml.io.toml_text import toml_value
 from soilml.log_import.channels.runs import run_names, runs_of
-from soilml.log_import.guesses.absent_channels import AbsentChannels
-from soilml.log_import.guesses.assignment import assign, axle_of
+from soilml.log_import.guesses.assignment import assign, axle_of, by_behaviour
 from soilml.log_import.guesses.channel_drafts import add_errors, draft_channels, is_error
 from soilml.log_import.guesses.clocks_and_runs import Division, divide, refuse_a_table_of_runs
 from soilml.log_import.guesses.columns import candidates_of, describe, liveliest
-from soilml.log_import.guesses.constants import agreed_constants, gears_in_names, stated_radius
+from soilml.log_import.guesses.constants import agreed_constants, number_in_names, stated_radius
 from soilml.log_import.guesses.draft import Draft, driving_means, implied_radius, inputs_of
 from soilml.log_import.guesses.evidence import Judge
-from soilml.log_import.guesses.forces import by_behaviour
-from soilml.log_import.guesses.role_words import USUAL, is_size, says
+from soilml.log_import.guesses.role_words import CLEAR, USUAL, is_size, says
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import LogMap
-from soilml.log_import.mapping.written_map import Marked, WrittenMap, WrittenTable
+from soilml.log_import.mapping.written_map import Marked, WrittenMap, WrittenTable, key_line
 from soilml.log_import.readers import Progress, read_logs, silent
 from soilml.log_import.readers.side_files import log_files
 from soilml.log_import.recording import Recording
@@ -33,6 +31,19 @@ _MOST_LISTED, _LOOKED = 40, 8  # Most columns that are listed, and runs that are
 #: Words of columns of plate and shear tests.
 _OF_PLATES = {"plate", "pressure", "penetration", "annulus", "shear", "platte", "druck"}
 _PLAUSIBLE = (0.02, 0.7)  # Radii of wheels, m
+#: Roles that are needed: what may stand for each, and what a map then says.
+_NEEDED = {
+    "wheel_speed": ({"wheel_angle", "rim_speed", "slip"},
+                    ": no column is the rotation of the wheel",
+                    ["# [wheel_angle]", "# [wheel_speed]"]),
+    "torque": ({"motor_current"}, " for a soil: no column is a torque",
+               ["# [torque]", "# [motor_current]"]),
+    "ground_speed": ({"position", "slip"}, ": no column is the travel",
+                     ["# [ground_speed]",
+                      '# value = "0.02 m/s +- 1 %"   # a carriage of constant speed']),
+}  # fmt: skip
+#: Uncertainty and unit of what logs state in place of a column.
+_STATED = {"load": ("1 %", "N"), "ground_speed": ("1 %", "m/s"), "slip": ("0.01", "1")}
 _HEAD = """\
 # Written by `soilml import --init`. All of it is a guess: look at the lines with
 # CHANGE and NEEDED first, then at the units. Values take a unit and an uncertainty:
@@ -100,15 +111,14 @@ class _Guess:
         shared, wheels = self.found.shared, self.found.wheels
         drafts, evidence = self._drafts()
         first = next(iter(drafts.values()))
-        absent = AbsentChannels(self.found, self.usable, self.stated, self.run_names)
-        tables = [*self.division.tables, *self._wheel_tables(first)]
+        tables = [*self.division.tables, self._wheel_table(first)]
         if "load" not in self.found.roles():
-            tables.append(absent.load(len(self.division.labels)))
+            tables.append(self._absent_load())
         for role, (_, what) in ROLES.items():
             if role in shared:
                 tables.append(replace(first[role], path=role, about=what))
             elif role not in self.found.roles() and role != "load":
-                tables += filter(None, [absent.table(role)])
+                tables += filter(None, [self._absent(role)])
         alike: dict[str, list[str]] = {}
         for role in next(iter(wheels.values()), {}):
             groups = [own[role].keys for own in drafts.values()]
@@ -135,8 +145,9 @@ class _Guess:
         drafts: dict[str, dict[str, Draft]] = {}
         for name, own in (found.wheels or {"": {}}).items():
             group = draft_channels(found.shared | own, self.run, self.steady, stated, found.parts)
-            evidence = judge.weigh(group, inputs_of(group, self.run, self.steady))
-            explained += [f"wheel {name}\n" if name else "", *map(str, evidence)]
+            judge.weigh(group, inputs_of(group, self.run, self.steady))
+            explained += [f"wheel {name}\n" if name else ""]
+            explained += [draft.evidence for draft in group.values()]
             for role, draft in group.items():
                 if others := [c.address for c in found.others.get(role, [])[:4]]:
                     draft.after = [f"# or: {', '.join(others)}"]
@@ -179,25 +190,15 @@ class _Guess:
         notes = dict.fromkeys(note for log in self.logs for r in log for note in r.notes)
         return lines + [f"# Note: {note}" for note in list(notes)[:5]]
 
-    def _wheel_tables(self, drafts: Mapping[str, Draft]) -> list[WrittenTable]:
-        """[wheel]: the radius that the logs state, or a line that asks for it; and [gears]."""
+    def _wheel_table(self, drafts: Mapping[str, Draft]) -> WrittenTable:
+        """[wheel]: the radius that the logs state, or a line that asks for it."""
         wheel, stated = WrittenTable("wheel"), self.stated.common
-        if several := gears_in_names(self.run_names):
-            pattern, gears = several
-            why = f"the names say {', '.join(list(gears)[:4])}; [gears.NAME] of the model file"
-            wheel.put("gear_from", pattern, why)
-            tables = [wheel]
-            for name, (key, value) in gears.items():
-                table = WrittenTable(f"gears.{toml_key(name)}")
-                table.put(key, f"{value} +- 1 %", "by the names")
-                tables.append(table)
-            return tables
         if key := next((key for key in ("radius", "diameter") if key in stated), ""):
             value, line = stated[key]
             asked = Marked(f"stated in the {line}") if "CHANGE" in line else ""
             value = value if " " in value else f"{value} m"
             wheel.put(key, f"{value} +- 1 %", asked or f"stated in the log: {line[:60]}")
-            return [wheel]
+            return wheel
         roles = self.found.roles()
         needed = bool({"wheel_speed", "wheel_angle"} & roles) and not {"slip", "rim_speed"} & roles
         inputs, ratio, hint = inputs_of(drafts, self.run, self.steady) if needed else None, 0.0, ""
@@ -211,7 +212,7 @@ class _Guess:
             )  # fmt: skip
         line = f'# radius = "0.15 m +- 1 %"  # {"NEEDED" if needed else "for checks"}{hint}'
         wheel.after.append(Marked(line) if needed else line)
-        return [wheel]
+        return wheel
 
     def _window_tables(self) -> list[WrittenTable]:
         """[windows], with shorter windows for short runs, and an example of [[leave_out]]."""
@@ -230,3 +231,89 @@ class _Guess:
             '# why = "the carriage was pulled"',
         ]
         return [table, WrittenTable(before=example)]
+
+    def _absent_load(self) -> WrittenTable:
+        """What stands for a load that no column has: what logs or names say, or the mass."""
+        common = self.stated.common
+        if said := self._said("load", logs="mass" not in common):
+            return said
+        count, why = max(1, len(self.found.wheels), len(self.division.labels)), ""
+        if count == 1:
+            number, line = common.get("wheels", ("1", ""))
+            why = f"stated in the log: {line[:60]}" if line else ""
+            count, why = int(number), why or Marked("CHANGE: how many wheels carry this mass")
+        table = WrittenTable(before=["# No column is a vertical load: it follows from the mass."])
+        if "mass" in common:
+            table.path = "vehicle"
+            value, line = common["mass"]
+            table.put("mass", f"{value} +- 1 %", f"stated in the log: {line[:60]}")
+            table.put("wheels", count, why)
+            return table
+        wheels = f"# {key_line('wheels', count, why)}"
+        table.after = [
+            Marked("# [vehicle]                   # NEEDED, or [load] value = '60 N +- 1 N'"),
+            '# mass = "6.1 kg +- 0.1 kg"   # all that stands on the wheels',
+            Marked(wheels) if isinstance(why, Marked) else wheels,
+        ]
+        return table
+
+    def _absent(self, role: str) -> WrittenTable | None:
+        """What stands for a role other than the load: what is stated or needed, or may be it."""
+        roles, others = self.found.roles(), self.found.others.get(role, [])
+        travels = {"position", "ground_speed"} & roles
+        if (role == "slip" and not travels) or (role == "ground_speed" and "slip" not in roles):
+            said = None if "position" in roles else self._said(role)
+            if said is not None:
+                return said
+        if role in _NEEDED and not others:
+            instead, what, options = _NEEDED[role]
+            needed = Marked(f"# NEEDED{what}. One of these:")
+            return None if instead & roles else WrittenTable(before=[needed, *options])
+        about = ROLES[role][1]
+        if others:
+            column = toml_value(others[0].address)
+            return WrittenTable(before=[f"# [{role}]  # {about}", f"# column = {column}"])
+        if role in ("drawbar_pull", "sinkage") and (names := self._perhaps(role)):
+            shown = ", ".join(names[:4])
+            line = Marked(f"# [{role}]  # CHANGE: perhaps one of {shown} is {about}")
+            return WrittenTable(before=[line, f"# column = {names[0]}"])
+        return None
+
+    def _said(self, role: str, logs: bool = True) -> WrittenTable | None:
+        """The table of a role that the lines before the headers state, of all logs or of each, or
+        whose number stands in the names of all runs.
+        """
+        std, unit = _STATED[role]
+        if logs and role in self.stated.common:
+            value, line = self.stated.common[role]
+            why = f"stated in the log: {line[:60]}"
+            return WrittenTable(role, {"value": f"{value} +- {std}"}, {"value": why})
+        if logs and role in self.stated.of_each:
+            pattern, own, values = self.stated.of_each[role]
+            if role == "slip" and any(float(value.split()[0]) > 1.0 for value in values):
+                unit = "%"
+            table = WrittenTable(role)
+            table.put("head", pattern, f"the logs state {', '.join(values[:4])}")
+            table.put("unit", own or unit)
+            if role == "slip":
+                why = Marked("CHANGE: how far the slip may be from what was set")
+                table.put("noise", 0.01, why)
+            return table
+        if (in_name := number_in_names(role, self.run_names)) is None:
+            return None
+        pattern, unit, numbers = in_name
+        why = f"the names say {', '.join(f'{n:g}' for n in numbers[:4])}"
+        return WrittenTable(role, {"file_name": pattern, "unit": unit}, {"file_name": why})
+
+    def _perhaps(self, role: str) -> list[str]:
+        """Columns of the unit of a role that nothing uses and that vary: one may be the role."""
+        groups = [self.found.shared, *self.found.wheels.values()]
+        used = {c.address for own in groups for c in own.values()}
+        used |= {c.address for own in self.found.parts.values() for c in own}
+        return [
+            toml_value(c.address) for c in self.usable
+            if c.address not in used and not c.constant
+            and (c.kind == ROLES[role][0] or (c.kind is None and c.score("position") > 0.0))
+            and not (role == "sinkage" and c.travel > 0.6)
+            and all(score < CLEAR for other, score in c.scores.items() if other != role)
+        ]  # fmt: skip
