@@ -16,7 +16,7 @@ from soilml.errors import InputError
 from soilml.log_import.channels.inputs import SMOOTH, Inputs
 from soilml.log_import.channels.resampling import derivative
 from soilml.log_import.mapping.log_map import LeaveOut, WheelMap, WindowSettings
-from soilml.log_import.windows.steady import Stretch
+from soilml.log_import.windows.steady import Stretch, searched_parts
 from soilml.remarks import Remark
 
 _MISSING = 0.2  # Largest share of missing samples in a stance
@@ -90,6 +90,7 @@ def stances(
             missing = float(np.mean(~np.isfinite(angle[inside])))
             ends = Stretch(float(own[0]), float(own[-1]))
             found.append((ends, Stretch(float(middle[0]), float(middle[-1])), missing))
+    left = searched_parts(time, windows, left_out)[1]
     usual = float(np.median([s.stop - s.start for s, _, _ in found])) if found else 0.0
     for whole, middle, missing in found:
         lasts, why = whole.stop - whole.start, None
@@ -99,11 +100,9 @@ def stances(
         elif lasts > _SLOWER * usual:
             text = f"the stance lasts {lasts:.3g} s, usual are {usual:.3g} s: it has a rest"
             why = Remark("at-rest", text, severity="note")
-        for entry in left_out:
-            if entry.start < whole.stop and entry.stop > whole.start:
-                why = Remark("left-out-by-map", entry.why, severity="note")
-        if whole.stop <= windows.within[0] or whole.start >= windows.within[1]:
-            why = Remark("outside", "outside of [windows] within", severity="note")
+        why = next(
+            (out.why for out in left if out.start < whole.stop and out.stop > whole.start), why
+        )
         yield Stretch(whole.start, whole.stop, why), middle
 
 
