@@ -112,7 +112,7 @@ class WheelRows:
         if angle is not None:
             parts = stances(inputs, angle, self.wheel, settings, left_out)
         else:
-            found = steady_windows(inputs.time, one.quantities, settings, left_out)
+            found = steady_windows(inputs.time, one.quantities, settings, left_out, inputs.motion)
             parts = ((stretch, None) for stretch in found)
         rows = []
         for stretch, within in parts:

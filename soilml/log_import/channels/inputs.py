@@ -65,6 +65,23 @@ class Inputs:
         known = ("wheel_speed", "rim_speed", "ground_speed")
         return next((self.values[role] for role in known if role in self.values), None)
 
+    @property
+    def motion(self) -> Floats | None:
+        """What is zero where the wheel rests (n,): the speed, else torque or current less its zero.
+
+        The zero is that of a log that begins at rest.
+        """
+        if self.speed is not None and np.isfinite(self.speed).any():
+            return self.speed
+        effort = self.values.get("torque", self.values.get("motor_current"))
+        first = max(3, round(_SHORTEST_REST / self.step))
+        if effort is None or "slip" not in self.values or not np.isfinite(effort[:first]).any():
+            return None
+        zero = float(np.nanmedian(effort[:first]))
+        usual = float(np.nanpercentile(np.abs(effort), 90))
+        moved = effort - (zero if abs(zero) < _EFFORT * usual else 0.0)
+        return np.where(np.abs(moved) > _EFFORT * usual, moved, 0.0)
+
     def within(self, start: float, stop: float) -> NDArray[np.bool_]:
         """Samples (n,) of a stretch."""
         return np.asarray((self.time >= start) & (self.time <= stop))
@@ -170,10 +187,9 @@ def channel_constant(run: Run, channel: ChannelMap) -> float:
 
 def resting(inputs: Inputs) -> slice | None:
     """The stretch before the wheel starts, without its end; None where there is none."""
-    speed = inputs.speed if inputs.speed is not None else _effort(inputs)
-    if speed is None or not np.isfinite(speed).any():
+    if inputs.motion is None:
         return None
-    size = np.abs(speed)
+    size = np.abs(inputs.motion)
     moves = np.nan_to_num(size) > max(_STANDS * float(np.nanpercentile(size, 90)), 1e-9)
     # a single noisy sample is no start
     width = max(1, round(0.1 / inputs.step))
@@ -190,19 +206,6 @@ def moving(inputs: Inputs) -> NDArray[np.bool_]:
         return np.ones(inputs.time.size, dtype=bool)
     size: Floats = np.abs(np.nan_to_num(inputs.speed))
     return np.asarray(size > 0.3 * np.percentile(size, 90))
-
-
-def _effort(inputs: Inputs) -> Floats | None:
-    """Torque or current (n,) less its zero, in a log of slip without speeds that begins at rest."""
-    effort = inputs.values.get("torque", inputs.values.get("motor_current"))
-    first = max(3, round(_SHORTEST_REST / inputs.step))
-    if effort is None or "slip" not in inputs.values or not np.isfinite(effort[:first]).any():
-        return None
-    zero = float(np.nanmedian(effort[:first]))
-    usual = float(np.nanpercentile(np.abs(effort), 90))
-    if abs(zero) >= _EFFORT * usual:
-        return None  # a zero that is far off, or a wheel that drives from the beginning
-    return np.where(np.abs(effort - zero) > _EFFORT * usual, effort - zero, 0.0)
 
 
 def _tare(inputs: Inputs, wheel: WheelMap) -> None:

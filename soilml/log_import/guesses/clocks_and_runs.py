@@ -133,9 +133,8 @@ def _clock(recordings: Log) -> tuple[str, str, str]:
         for c in candidates_of([recording]) if recording.clock is None else ():
             if c.score("time") > best[0]:
                 unit, clear = time_unit(recording.columns[c.name])
-                why = Marked("CHANGE: not stated; by the size of its steps")
-                stated = c.kind == "s"
-                unit, why = c.unit if stated else unit, "" if stated or clear else why
+                why = "" if clear else Marked("CHANGE: not stated; by the size of its steps")
+                unit, why = (c.unit, "") if c.kind == "s" else (unit, why)
                 best = (c.score("time"), c.name, unit, why)
     return best[1:]
 

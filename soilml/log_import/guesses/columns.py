@@ -30,8 +30,6 @@ _PERIODS = (360.0, 2.0 * np.pi, 65536.0, 4096.0, 1024.0, 8192.0, 16384.0, 32768.
 _DAYS = (25_000.0, 80_000.0, 1.2e-4)
 #: Least size of clocks since 1970, in the units that count them.
 _SINCE_1970 = (("ns", 5e17), ("us", 5e14), ("ms", 5e11), ("s", 5e8))
-_UNCLEAR = 0.5  # What puts a speed of a side, without another word, before other guesses
-_SIDE = re.compile(r"(?:(?<=[a-z_. ])[LR]|[_. ]?(?:[lr]|left|right)(?![a-z])|\d)$")
 #: Largest size of a slip; least load, N, and largest range of a sinkage, mm, without a unit.
 _MOST_SLIP, _LEAST_LOAD, _MOST_SINKAGE = 150.0, 1.0, 900.0
 _FEWEST_PLACES = 10  # Fewest different values of a travel
@@ -73,26 +71,12 @@ class Candidate:
 
 
 def candidates_of(recordings: Sequence[Recording], steady: bool = False) -> list[Candidate]:
-    """All numeric columns, with their scores; in a table of `steady` runs they may be constant.
-
-    A vehicle has one speed of travel: of a left and a right side, or with numbers, as `velL` and
-    `velR`, `velocity0` and `velocity1`, they are those of wheels.
-    """
+    """All numeric columns, with their scores; in a table of `steady` runs they may be constant."""
     counts = Counter(name for recording in recordings for name in recording.columns)
-    columns = [
+    return [
         _candidate(recording, name, counts[name] > 1, steady)
         for recording in recordings for name in recording.columns
     ]  # fmt: skip
-    frames: dict[str, list[int]] = {}
-    for i, c in enumerate(columns):
-        best = max(c.scores, key=c.score, default="")
-        if best == "ground_speed" and (match := _SIDE.search(c.address)):
-            frames.setdefault(c.address[: match.start()], []).append(i)
-    for i in (i for own in frames.values() if len(own) > 1 for i in own):
-        role = "rim_speed" if columns[i].kind == "m/s" else "wheel_speed"
-        score = columns[i].score("ground_speed") + _UNCLEAR
-        columns[i] = replace(columns[i], scores={role: score})
-    return columns
 
 
 def _candidate(recording: Recording, name: str, ambiguous: bool, steady: bool) -> Candidate:

@@ -47,9 +47,9 @@ def read_delimited_text(
     text, encoding = decode_text(path.read_bytes(), path)
     if any(mark in text for mark in _MARKS):
         text = _GROUPED.sub("", text)
-    plain = encoding in ("utf-8", "utf-8-sig")
     said = Remark("encoding", f"read as {encoding}", severity="note")
-    return _recordings_of(path, text.splitlines(), [] if plain else [said])
+    notes = [] if encoding in ("utf-8", "utf-8-sig") else [said]
+    return _recordings_of(path, text.splitlines(), notes)
 
 
 def read_spreadsheet_log(path: Path) -> list[Recording]:

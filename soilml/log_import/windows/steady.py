@@ -23,10 +23,8 @@ _WATCHED = {"rim_speed": 0.01, "speed": 0.015, "slip": 0.01, "torque": 0.03, "lo
 _MOST_VALUES, _SHORTEST_MEAN = 500, 0.1
 _MISSING = 0.2  # Largest share of missing samples in a window
 _SIGNIFICANT = 4.0  # A change within a window counts where it is this many standard errors
-#: Share of the usual speed of the rim, or of the usual torque, below which a wheel is at rest.
+#: Share of the usual speed, or of the usual torque, below which a wheel is at rest.
 _AT_REST = 0.1
-#: Beginning of a log in which the wheel may rest, s, and a slip that is another than there.
-_FIRST, _OTHER_SLIP = 0.4, 0.03
 
 
 @dataclass(frozen=True)
@@ -43,6 +41,7 @@ def steady_windows(
     quantities: Mapping[str, Floats],
     settings: WindowSettings,
     left_out: tuple[LeaveOut, ...] = (),
+    motion: Floats | None = None,
 ) -> list[Stretch]:
     """Divide a run into steady windows and stretches that are left out, in order of time.
 
@@ -50,8 +49,9 @@ def steady_windows(
     quantities: Samples (n,) by name: `rim_speed`, `speed`, `torque`, ...
     settings: How steady and how long windows are.
     left_out: Stretches that the user leaves out of this run.
+    motion: What is zero where the wheel rests (n,); None where nothing says it.
     """
-    search = _Search(time, quantities, settings)
+    search = _Search(time, quantities, settings, motion)
     parts, found = searched_parts(time, settings, left_out)
     for part in parts:
         rows = np.flatnonzero(search.inside(*part))
@@ -100,6 +100,7 @@ class _Search:
     time: Floats
     quantities: Mapping[str, Floats]
     settings: WindowSettings
+    motion: Floats | None
 
     @property
     def step(self) -> float:
@@ -161,8 +162,8 @@ class _Search:
     def why_not(self, start: float, stop: float) -> Remark | None:
         """Why a stretch is no steady window; a part of one that is `not-steady` may be one."""
         rows, shortest = self.inside(start, stop), self.settings.shortest
-        if rests := self.why_at_rest(rows):
-            return rests
+        if self.rests(rows):
+            return Remark("at-rest", "the wheel is at rest", severity="note")
         if stop - start < shortest:
             text = f"{stop - start:.2g} s are too short (less than {shortest:g} s)"
             return Remark("too-short", text, severity="note")
@@ -201,28 +202,10 @@ class _Search:
                     return Stretch(a, b)
         return stretch
 
-    def why_at_rest(self, rows: NDArray[np.bool_]) -> Remark | None:
-        """By what the wheel is at rest in a window; None where it turns, or nothing says it."""
-        rim = self.quantities.get("rim_speed", self.quantities.get("speed"))
-        if rim is not None and np.isfinite(rim[rows]).any():
-            usual = float(np.nanpercentile(np.abs(rim), 90))
-            rests = float(np.nanmedian(np.abs(rim[rows]))) < _AT_REST * usual
-            return Remark("at-rest", "the wheel is at rest", severity="note") if rests else None
-        torque = self.quantities.get("torque")
-        if torque is None or not np.isfinite(torque[rows]).any():
-            return None
-        near_zero = _AT_REST * float(np.nanpercentile(np.abs(torque), 90))
-        if float(np.nanmedian(np.abs(torque[rows]))) >= near_zero:
-            return None
-        # where a wheel begins to brake, slip varies little and is not that of the rest before
-        first = slice(0, max(3, round(_FIRST / self.step)))
-        slip, before = self.known("slip", rows), self.known("slip", first)
-        rested = self.known("torque", first)
-        if slip is not None and before is not None and rested is not None:
-            middle = float(np.nanmedian(slip))
-            other = abs(middle - float(np.nanmedian(before))) > _OTHER_SLIP
-            steady = float(np.nanstd(slip)) < 0.5 * abs(middle)
-            if steady and other and abs(np.nanmedian(rested)) < near_zero:
-                return None
-        text = "the torque is near zero: the wheel is probably at rest"
-        return Remark("torque-near-zero", text, ("torque",))
+    def rests(self, rows: NDArray[np.bool_]) -> bool:
+        """Whether the wheel is at rest in a window; not where nothing says it."""
+        motion = self.motion
+        if motion is None or not np.isfinite(motion[rows]).any():
+            return False
+        usual = float(np.nanpercentile(np.abs(motion), 90))
+        return float(np.nanmedian(np.abs(motion[rows]))) < _AT_REST * usual
