@@ -35,9 +35,9 @@ def picture(logs: list[str], chart: Path, target: Path) -> None:
         first, second, third = figure.subfigures(1, 3)
         for canvas, series in zip((first, second), imported.series[::3], strict=False):
             draw_run(series, imported.table, canvas.subplots(len(run_panels(series)), 1))
-        shown = panels_over_slip(imported.table, imported.radius)[:2]
-        for axes, panel in zip(third.subplots(2, 1, sharex=True), shown, strict=True):
-            draw_over_slip(axes, imported.table, panel)
+        shown = panels_over_slip(imported.table, imported.radius)
+        for axes, title in zip(third.subplots(2, 1, sharex=True), shown, strict=False):
+            draw_over_slip(axes, imported.table, title, *shown[title])
         first.axes[-1].set_xlabel("time, s; sand_1")
         second.axes[-1].set_xlabel("time, s; sand_4: somebody pulls on the carriage at the end")
         figure.savefig(target, dpi=80, facecolor="white")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings, simplefilter
@@ -159,36 +158,31 @@ def plot_rows(table: Table, radius: float, ax: Any = None) -> NDArray[Any]:
     """Draw the rows over slip, a panel for each channel that was measured; see `take_axes`."""
     shown = panels_over_slip(table, radius)
     panels = take_axes(ax, 1, len(shown), (5.0 * len(shown), 3.6))[0]
-    for axes, panel in zip(panels, shown, strict=True):
-        draw_over_slip(axes, table, panel)
+    for axes, (title, panel) in zip(panels, shown.items(), strict=True):
+        draw_over_slip(axes, table, title, *panel)
     return np.asarray(panels)
 
 
-@dataclass(frozen=True)
-class PanelOverSlip:
-    """A column to show over slip, what it is divided by (rows,), and the title."""
+def panels_over_slip(table: Table, radius: float) -> dict[str, tuple[str, Floats]]:
+    """Columns to show over slip, and what each is divided by (rows,), by title.
 
-    key: str
-    unit: Floats
-    title: str
-
-
-def panels_over_slip(table: Table, radius: float) -> list[PanelOverSlip]:
-    """T / (W r), or torque where the radius (m) is NaN; drawbar pull over load; sinkage."""
+    T / (W r), or torque where the radius (m) is NaN; drawbar pull over load; sinkage.
+    """
     load, one = table["load_N"], np.ones(len(table))
-    torque = (load * radius, "torque / (load × radius)")
+    of_radius = np.isfinite(radius)
     known = {
-        "torque_Nm": torque if np.isfinite(radius) else (one, "torque, N m"),
-        "drawbar_pull_N": (load, "drawbar pull / load"),
-        "sinkage_m": (1e-3 * one, "sinkage, mm"),
-    }
-    return [PanelOverSlip(key, *shown) for key, shown in known.items()
-            if key in table and np.isfinite(table[key]).any()]  # fmt: skip
+        "torque / (load × radius)" if of_radius else "torque, N m":
+            ("torque_Nm", load * radius if of_radius else one),
+        "drawbar pull / load": ("drawbar_pull_N", load),
+        "sinkage, mm": ("sinkage_m", 1e-3 * one),
+    }  # fmt: skip
+    return {title: panel for title, panel in known.items()
+            if panel[0] in table and np.isfinite(table[panel[0]]).any()}  # fmt: skip
 
 
-def draw_over_slip(axes: Axes, table: Table, panel: PanelOverSlip) -> None:
+def draw_over_slip(axes: Axes, table: Table, title: str, key: str, unit: Floats) -> None:
     """Draw a column over slip with 90 % intervals, in a colour for each load."""
-    key, unit, loads = panel.key, panel.unit, table["load_N"]
+    loads = table["load_N"]
     groups = load_levels(loads).index
     std, slip_std = _std(table, key), _std(table, "slip")
     for k in range(int(groups.max()) + 1):
@@ -201,7 +195,7 @@ def draw_over_slip(axes: Axes, table: Table, panel: PanelOverSlip) -> None:
         )  # fmt: skip
     axes.axhline(0.0, color=PRIOR, lw=0.8, zorder=0)
     axes.set_xlabel("slip")
-    axes.set_title(panel.title)
+    axes.set_title(title)
     axes.legend(title="load", title_fontsize=9)
 
 

@@ -66,24 +66,15 @@ def import_log(
     MissingLibraryError
         Where a reader's library is not installed.
     """
-    said = progress or silent
-    files = log_files(logs)
-    if not isinstance(log_map, LogMap):
-        log_map = map_from(log_map) if isinstance(log_map, Mapping) else read_map(log_map)
-    return import_recordings(read_logs(files, said), log_map, accept, said)
-
-
-def import_recordings(
-    recordings: Sequence[Sequence[Recording]],
-    found: LogMap,
-    accept: bool = False,
-    progress: Progress = silent,
-) -> ImportedLog:
-    """What `import_log` gives, of logs that are read already; raises as it does."""
-    steady = found.runs.each_row
+    said, files = progress or silent, log_files(logs)
+    if isinstance(log_map, LogMap):
+        found = log_map
+    else:
+        found = map_from(log_map) if isinstance(log_map, Mapping) else read_map(log_map)
+    recordings, steady = read_logs(files, said), found.runs.each_row
     runs = runs_of_rows(recordings, found) if steady else runs_of(recordings, found)
     parts = [part for w in found.wheels for part in wheels_by_gear(found, w, runs)]
-    wheels = [WheelRows(found, wheel, [runs[i] for i in own], progress) for wheel, own in parts]
+    wheels = [WheelRows(found, wheel, [runs[i] for i in own], said) for wheel, own in parts]
     # by run: its wheels, each in the analysis that has its gear, and the run's place there
     by_run = [
         (run, wheel, own.index(i))
