@@ -90,25 +90,32 @@ def drop_clipped(inputs: Inputs, rows: Sequence[WindowRow]) -> list[Remark]:
     return found
 
 
+def offset_at_rest(inputs: Inputs, role: str) -> float:
+    """What a sensor reads before the wheel starts, where that is more than noise and worth a tare.
+
+    0 where it is not, and where the wheel never rests.
+    """
+    mean, error = inputs.rest.get(role, (0.0, 0.0))
+    if role not in inputs.values or not abs(mean) > 5.0 * np.nan_to_num(error):
+        return 0.0
+    return mean if abs(mean) > _OFFSET * _level(inputs, role) else 0.0
+
+
 def untared_sensors(wheel: WheelMap, runs: Sequence[Inputs]) -> list[Remark]:
     """Sensors that read something at rest, where they should read zero, and are not tared."""
     found = []
     most = _SUNK * (wheel.radius.value if wheel.radius else 0.1)
     for role in _WITH_A_ZERO:
         channel = wheel.channels.get(role)
-        offsets: list[tuple[float, float]] = []  # With their shares of the reading while driving
-        for inputs in runs if channel is not None and channel.tare is None else ():
-            mean, error = inputs.rest.get(role, (float("nan"), 0.0))
-            sunk = role == "sinkage" and 0.0 < mean < most  # a wheel at rest has sunk in
-            if role in inputs.values and not sunk and abs(mean) > 5.0 * np.nan_to_num(error):
-                level = _level(inputs, role)
-                offsets.append((mean, abs(mean) / level if level else np.inf))
-        middle, share = np.median(offsets, axis=0) if offsets else (0.0, 0.0)
-        if share > _OFFSET:
+        own = runs if channel is not None and channel.tare is None else ()
+        offsets = [offset for inputs in own if (offset := offset_at_rest(inputs, role))]
+        if role == "sinkage":  # a wheel at rest has sunk in
+            offsets = [offset for offset in offsets if not 0.0 < offset < most]
+        if len(offsets) > len(runs) / 2:
             text = (
-                f"[{role}] reads {middle:.3g} {UNITS[role]} before the wheel starts "
-                f"({len(offsets)} of {len(runs)} runs), {share:.0%} of its reading while driving: "
-                "add tare = 'rest' where it should read zero there"
+                f"[{role}] reads {float(np.median(offsets)):.3g} {UNITS[role]} before the wheel "
+                f"starts ({len(offsets)} of {len(runs)} runs): add tare = 'rest' where it should "
+                "read zero there"
             )
             found.append(Remark("not-tared", text, (role,)))
     return found

@@ -14,6 +14,7 @@ from soilml.io.declared_settings import take_declared
 from soilml.io.toml_settings import Settings
 from soilml.log_import.channels.inputs import Inputs, combined, moving, wheel_inputs
 from soilml.log_import.channels.runs import Run
+from soilml.log_import.checks.sensors import offset_at_rest
 from soilml.log_import.guesses.columns import Candidate
 from soilml.log_import.guesses.role_words import USUAL, says, words_of
 from soilml.log_import.mapping.channel_map import ChannelMap, Uncertain
@@ -21,7 +22,6 @@ from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.mapping.written_map import Marked, WrittenTable
 
 BY_NAME = "by its name"  # Why a unit is known that no brackets state, as of ticks and rpm
-_OFFSET = 0.01  # Share of the reading while driving from which a reading at rest is an offset
 #: A sensor that reads more than this, m, has its zero elsewhere; how far a wheel sinks at rest, m.
 _FAR, _SUNK = 0.08, 0.01
 #: Share of the radius that no wheel sinks in at rest; what is more than noise of a reading, m.
@@ -193,17 +193,10 @@ def put_signs(drafts: dict[str, Draft], inputs: Inputs) -> None:
 
 def put_tares(drafts: dict[str, Draft], inputs: Inputs) -> None:
     """Tare what reads something before the wheel starts and should read zero there."""
-    driven = moving(inputs)
     for role, draft in drafts.items():
-        if not USUAL[role].zero or role not in inputs.rest or role not in inputs.values:
-            continue
-        mean, error = inputs.rest[role]
-        level = abs(float(np.nanmedian(inputs.values[role][driven])) - mean)
-        if not abs(mean) > 3.0 * np.nan_to_num(error) or level == 0.0:
-            continue
-        if abs(mean) > _OFFSET * level and (role != "motor_current" or abs(mean) < level):
+        if USUAL[role].zero and (offset := offset_at_rest(inputs, role)):
             why = "before the wheel starts; remove this line where that is real"
-            draft.put("tare", "rest", f"it reads {mean:.3g} {why}")
+            draft.put("tare", "rest", f"it reads {offset:.3g} {why}")
 
 
 def put_zero_of_sinkage(drafts: dict[str, Draft], inputs: Inputs, radius: float) -> None:
