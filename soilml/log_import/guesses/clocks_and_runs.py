@@ -65,9 +65,7 @@ def divide(logs: Sequence[Log], stated: Mapping[str, tuple[str, str]]) -> Divisi
         return found
     column, labels, of_wheels = _label_column(log)
     first = [recording for log in logs[:4] for recording in log]
-    if of_wheels:
-        found.labels = labels
-        first = [_lines_of_first(recording, column) for recording in first]
+    found.labels = labels if of_wheels else ()
     clock, unit, why = _clock(first)
     if clock or any(recording.clock is not None for recording in first):
         found.time = TimeMap(clock, unit)
@@ -165,12 +163,6 @@ def _label_column(recordings: Log) -> tuple[str, list[str], bool]:
             if take_turns and "" not in labels and (sides or of_wheel):
                 return name, labels, True
     return "", [], False
-
-
-def _lines_of_first(recording: Recording, column: str) -> Recording:
-    """The recording with the lines of its first label alone, where it has this column."""
-    cells = np.asarray(recording.texts.get(column) or recording.columns.get(column, []))
-    return recording.rows(cells == cells[0]) if cells.size else recording
 
 
 def _structs_that_are_runs(recordings: Log, clock: str) -> int:
