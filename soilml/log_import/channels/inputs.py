@@ -75,7 +75,8 @@ class Inputs:
             return self.speed
         effort = self.values.get("torque", self.values.get("motor_current"))
         first = max(3, round(_SHORTEST_REST / self.step))
-        if effort is None or "slip" not in self.values or not np.isfinite(effort[:first]).any():
+        of_slip = "slip" in self.values or "slip" in self.constants
+        if effort is None or not of_slip or not np.isfinite(effort[:first]).any():
             return None
         zero = float(np.nanmedian(effort[:first]))
         usual = float(np.nanpercentile(np.abs(effort), 90))
