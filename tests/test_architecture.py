@@ -28,7 +28,6 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/gap/workflow.py": {"threadpoolctl"},
     "soilml/inference/posterior.py": {"threadpoolctl"},
     "soilml/systems/rim_stress/stress.py": {"scipy"},
-    "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/presentation.py": {"matplotlib"},
     "soilml/gap/scores.py": {"scipy"},
     "soilml/gap/identifiability.py": {"scipy"},
