@@ -35,7 +35,7 @@ from soilml.remarks import Remark
 
 
 @dataclass
-class WheelRun:
+class RunOfWheel:
     """One run of a wheel, over time or as lines of a table.
 
     rows: All of them; `kept` are those that can be used.
@@ -61,7 +61,7 @@ class WheelRows:
         self.log_map, self.wheel = log_map, wheel
         self.of = f" of wheel {wheel.name}" if wheel.name else ""
         self.conversion = Conversion(wheel, log_map.vehicle)
-        self.runs = [WheelRun(run) for run in runs]
+        self.runs = [RunOfWheel(run) for run in runs]
         odd: dict[tuple[int, int], Remark] = {}
         if log_map.runs.each_row:
             for one in self.runs:
@@ -101,7 +101,7 @@ class WheelRows:
                 add_stated_errors(row, own, self.conversion)
         return odd
 
-    def _windows(self, one: WheelRun, inputs: Inputs) -> list[WindowRow]:
+    def _windows(self, one: RunOfWheel, inputs: Inputs) -> list[WindowRow]:
         """The rows of a run over time; what is left out of it joins its stretches."""
         angle = leg_angle(inputs, self.wheel) if self.wheel.leg is not None else None
         quantities = self.conversion.of({**inputs.values, **inputs.constants})
