@@ -39,6 +39,7 @@ class RunOfWheel:
     """One run of a wheel, over time or as lines of a table.
 
     rows: All of them; `kept` are those that can be used.
+    odd: Why rows are irregular, by their places.
     stretches: What is left out, with the reason.
     """
 
@@ -47,6 +48,7 @@ class RunOfWheel:
     dead: dict[str, str] = field(default_factory=dict)
     quantities: dict[str, Floats] = field(default_factory=dict)
     rows: list[WindowRow] = field(default_factory=list)
+    odd: dict[int, Remark] = field(default_factory=dict)
     kept: list[WindowRow] = field(default_factory=list)
     stretches: list[Stretch] = field(default_factory=list)
 
@@ -62,23 +64,22 @@ class WheelRows:
         self.of = f" of wheel {wheel.name}" if wheel.name else ""
         self.conversion = Conversion(wheel, log_map.vehicle)
         self.runs = [RunOfWheel(run) for run in runs]
-        odd: dict[tuple[int, int], Remark] = {}
         if log_map.runs.each_row:
             for one in self.runs:
                 one.rows = table_rows(one.run, self.conversion)
         else:
-            odd = self._find_windows(progress)
+            self._find_windows(progress)
         # the slip of stances may be what is asked for
         needed = ("slip", "load") if wheel.leg is None else ("load",)
-        for i, one in enumerate(self.runs):
+        for one in self.runs:
             for k, row in enumerate(one.rows):
-                if why := unusable(row, one.dead, needed) or odd.get((i, k)):
+                if why := unusable(row, one.dead, needed) or one.odd.get(k):
                     one.stretches.append(replace(row.window, why=why))
                 else:
                     one.kept.append(row)
 
-    def _find_windows(self, progress: Progress) -> dict[tuple[int, int], Remark]:
-        """Find the rows of runs over time; reasons for irregular ones, by run and row."""
+    def _find_windows(self, progress: Progress) -> None:
+        """Find the rows of runs over time."""
         inputs = [wheel_inputs(one.run, self.wheel) for one in self.runs]
         stage = f"finding steady windows{self.of}"
         for i, (one, own, dead) in enumerate(
@@ -91,15 +92,13 @@ class WheelRows:
             one.rows = self._windows(one, own)
             clipped = drop_clipped(own, one.rows)
             self.computed += [r.under(f"run {one.run.name}: ") for r in clipped]
+            one.odd = irregular_windows(one.rows) if self.wheel.leg is None else {}
         progress(stage, len(self.runs), len(self.runs))
-        rows = [one.rows for one in self.runs]
-        odd = irregular_windows(rows) if self.wheel.leg is None else {}
-        pool_errors([row for i, own in enumerate(rows) for k, row in enumerate(own)
-                     if (i, k) not in odd])  # fmt: skip
-        for own, found in zip(inputs, rows, strict=True):
-            for row in found:
+        pool_errors([row for one in self.runs for k, row in enumerate(one.rows)
+                     if k not in one.odd])  # fmt: skip
+        for one, own in zip(self.runs, inputs, strict=True):
+            for row in one.rows:
                 add_stated_errors(row, own, self.conversion)
-        return odd
 
     def _windows(self, one: RunOfWheel, inputs: Inputs) -> list[WindowRow]:
         """The rows of a run over time; what is left out of it joins its stretches."""
