@@ -85,13 +85,13 @@ def test_a_malformed_entry_is_refused_by_every_command(tmp_path, capsys, monkeyp
 
     monkeypatch.setattr(model_file, "create_session", created)
     (tmp_path / "runs.csv").write_text(RUNS)
-    others = {"estimate": "runs.csv", "export-c": "m.c"}
+    others = {"estimate": "runs.csv", "export c": "m.c"}
     for what, change in CHANGES.items():
         file = signed(SOURCE, tmp_path / "m.onnx", **change)
         every = what in ("null as set", "without gear")
         for command, other in others.items() if every else [("estimate", "runs.csv")]:
             with subtests.test(f"{what}, {command}"):
-                assert main([command, str(file), str(tmp_path / other)]) == 2
+                assert main([*command.split(), str(file), str(tmp_path / other)]) == 2
                 captured = capsys.readouterr()
                 assert captured.err.count("\n") == 1 and "metadata is damaged" in captured.err
                 assert captured.out == "" and "\x1b" not in captured.err
