@@ -26,7 +26,7 @@ def store():
 @pytest.fixture(scope="module")
 def model(tmp_path_factory):
     file = str(tmp_path_factory.mktemp("slip_node") / "rover.onnx")
-    assert main(["export-slip", str(SLIP / "rover.toml"), file, "--draws", "128"]) == 0
+    assert main(["export", "slip", str(SLIP / "rover.toml"), file, "--draws", "128"]) == 0
     return file
 
 

@@ -26,7 +26,16 @@ def folder(workplace):
 
 
 def test_the_table_names_the_best_rows_and_what_they_leave(folder, capsys):
-    command = ["advise", "model.toml", "runs.csv", "--slip", "0.05,0.6", "--load", "30,60,120"]
+    command = [
+        "plan",
+        "next",
+        "model.toml",
+        "runs.csv",
+        "--slip",
+        "0.05,0.6",
+        "--load",
+        "30,60,120",
+    ]
     assert main([*command, "--count", "2", "--out", "o.csv", "--picture", "o.png"]) == 0
     assert capsys.readouterr().out.startswith("Measure next: slip 0.6 at 120 N")
     assert (folder / "o.png").read_bytes().startswith(b"\x89PNG")

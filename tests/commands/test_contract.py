@@ -102,12 +102,12 @@ def test_generate_train_estimate_follow_each_other(tmp_path, runs_file, capsys):
 
 def test_soils_and_effects_list_their_catalogues(capsys):
     for words, names in {
-        "soils": ("wong1989/dry_sand", "kphi"),
-        "soils comin2017/es-3": ("published as -830",),
-        "effects": ("slip-sinkage", "grousers", "exit-angle", "bulldozing"),
-        "effects grousers": ("height",),
+        "show soils": ("wong1989/dry_sand",),
+        "show soils comin2017/es-3": ("published as -830",),
+        "show effects": ("slip-sinkage", "grousers", "exit-angle", "bulldozing"),
+        "show effects grousers": ("height",),
     }.items():
         listed = printed(words.split(), capsys).out
         assert all(name in listed for name in names)
-    listed = json.loads(printed(["soils", "--format", "json"], capsys).out)
+    listed = json.loads(printed(["show", "soils", "--format", "json"], capsys).out)
     assert listed["wong1989/dry_sand"]["values"]["n"] == 1.1

@@ -5,7 +5,7 @@ from console import refused, rows_of
 
 from soilml import gap
 from soilml.cli import main
-from soilml.cli.commands.example import EXAMPLES
+from soilml.cli.commands.example import NEXT
 
 
 @pytest.mark.slow
@@ -47,7 +47,7 @@ def test_examples_replace_nothing_and_name_each_other(workplace, capsys):
     refused(["example", "."], capsys, "model.toml exists; give another folder", workplace)
     assert main(["example", "campain", "x"]) == 2
     said = capsys.readouterr().err
-    assert "did you mean 'campaign'" in said and all(name in said for name in EXAMPLES)
+    assert "did you mean 'campaign'" in said and all(name in said for name in NEXT)
 
 
 @pytest.mark.slow

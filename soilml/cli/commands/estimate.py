@@ -11,8 +11,6 @@ from soilml.errors import InputError
 
 if TYPE_CHECKING:
     from soilml.onboard.estimator import Estimator
-    from soilml.onboard.table_estimates import TableEstimates
-    from soilml.remarks import Remark
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
@@ -125,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
         ),
     )  # fmt: skip
     columns = found.columns(list(dict.fromkeys(n for one in estimators for n in one.inputs)))
-    remarks += presentation.remarks_on(found, estimators) + _advice(found)
+    remarks += presentation.remarks_on(found, estimators)
     if args.report is not None:
         presentation.check_size(len(columns["in_range"]))
 
@@ -141,40 +139,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
     """Raise `InputError` for options that cannot be combined."""
-    from soilml.onboard import table_estimates
-    from soilml.onboard.joint_errors import are_comparable
-
     if args.runs is None and any((args.by, args.where, args.out, args.report)):
         raise InputError("RUNS.csv is missing: --by, --where, --out and --report are for its rows")
     if args.by is not None and args.with_:
         raise InputError("--with fuses single rows; omit --by")
-    if not are_comparable([e.errors for e in estimators]):
-        table_estimates.check_independent(estimators)
     if args.by is not None and estimators[0].per_row:
         raise InputError(
             f"{args.trained} estimates {estimators[0].per_row[0]}, which differs from row to row "
             "of a run; omit --by"
         )
-
-
-def _advice(found: TableEstimates) -> list[Remark]:
-    """What to measure after a typical row, or after the group that is known least."""
-    import numpy as np
-
-    from soilml.experiment_design.next_rows import advice_after_estimate
-    from soilml.io.table import ALL
-    from soilml.onboard import presentation, table_estimates
-
-    place = presentation.typical(found)
-    if place is None or found.rule is not None:
-        return []
-    if found.by is None:
-        row = found.table.rows(np.asarray([place]))
-        readings = table_estimates.row_readings(found.estimator, row)
-        head = f"after {found.table.place(place)} alone, a typical row: "
-    else:
-        readings = found.readings[int(found.answered[:place].sum())]
-        head = "" if found.by == ALL else f"{found.by} {found.names[place]}: "
-    own = found.estimate.mean[place], found.estimate.covariance[place]
-    advised = advice_after_estimate(found.estimator, *own, readings, found.box)
-    return [one.under(head) for one in (advised[-1:] if found.by is None else advised)]

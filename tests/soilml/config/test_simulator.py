@@ -161,17 +161,17 @@ def test_design_runs_makes_runs_and_more_where_the_emulator_is_unsure(
     own = {"python": 'python = "rig.py:forces"', "command": 'command = "PY rig.py {design} {runs}"'}
     text = MODEL + SIMULATOR + own[how].replace("PY", sys.executable) + "\n"
     (workplace / "model.toml").write_text(text)
-    assert main(["design-runs", "model.toml", "--trust", "--count", "40"]) == 0
+    assert main(["plan", "runs", "model.toml", "--trust", "--count", "40"]) == 0
     captured = capsys.readouterr()
     assert "40 runs in" in captured.err and "torque_Nm" in captured.out
     first = read_table("simulated.csv")
     assert len(first) == 40 and np.isfinite(first["torque_Nm"]).all()
-    assert main(["design-runs", "model.toml", "--trust", "--count", "10"]) == 0
+    assert main(["plan", "runs", "model.toml", "--trust", "--count", "10"]) == 0
     both = read_table("simulated.csv")
     assert len(both) == 50 and both["slip"][:40].tolist() == first["slip"].tolist()
     if how == "python":
         # a design without the runs, and the case that uses them
-        assert main(["design-runs", "model.toml", "--count", "5", "--out", "more.csv"]) == 0
+        assert main(["plan", "runs", "model.toml", "--count", "5", "--out", "more.csv"]) == 0
         assert "torque_Nm" not in Path("more.csv").read_text()
         assert read_case("model.toml").simulator.error["torque_Nm"] > 0.0
 
@@ -185,18 +185,18 @@ def test_design_runs_makes_runs_and_more_where_the_emulator_is_unsure(
 def test_a_model_file_runs_no_code_by_itself(workplace, capsys, own, words):
     (workplace / "rig.py").write_text('from pathlib import Path\n\nPath("it_ran").touch()\n' + RIG)
     (workplace / "model.toml").write_text(MODEL + SIMULATOR + own + "\n")
-    assert main(["design-runs", "model.toml", "--count", "40", *words]) == 0
+    assert main(["plan", "runs", "model.toml", "--count", "40", *words]) == 0
     assert not {"it_ran", "simulated.csv"} & {file.name for file in workplace.iterdir()}
     said = capsys.readouterr().err
     assert ("with --trust" in said) == (not words)
     assert words or "rig.py:forces" in said or "sh -c" in said
-    main(["design-runs", "model.toml", "--count", "40", "--trust"])
+    main(["plan", "runs", "model.toml", "--count", "40", "--trust"])
     assert Path("it_ran").exists()
 
 
 def test_trust_needs_code_that_it_trusts(workplace, capsys):
     (workplace / "model.toml").write_text(MODEL + SIMULATOR)
-    assert main(["design-runs", "model.toml", "--trust"]) == 2
+    assert main(["plan", "runs", "model.toml", "--trust"]) == 2
     assert "neither python nor command" in capsys.readouterr().err
 
 
@@ -250,7 +250,7 @@ def test_runs_that_cannot_stand_in_for_equations_are_refused(folder, tmp_path):
 def test_simulators_that_fail_are_one_line(workplace, capsys, body, said):
     (workplace / "rig.py").write_text(f"def forces(design):\n    {body}\n")
     (workplace / "model.toml").write_text(MODEL + SIMULATOR + 'python = "rig.py:forces"\n')
-    assert main(["design-runs", "model.toml", "--trust", "--count", "40"]) == 2
+    assert main(["plan", "runs", "model.toml", "--trust", "--count", "40"]) == 2
     captured = capsys.readouterr()
     assert said in captured.err and captured.err.count("\n") == 1
     assert not (workplace / "simulated.csv").exists()

@@ -237,7 +237,7 @@ def test_other_bad_input_is_one_line(rover, estimator, tmp_path, dem):
 def test_the_command_writes_its_folder(rover, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "drive.csv").write_text(csv_text(two_soils(60)))
-    words = ["map", str(rover), "drive.csv", "--from", "wheel", "--cell", "2"]
+    words = ["drive", "map", str(rover), "drive.csv", "--from", "wheel", "--cell", "2"]
     monkeypatch.setattr("soilml.soil_maps.field.DRAWS", 100)
     assert main([*words, "--slope", "0,10", "--out", "map"]) == 0
     said = capsys.readouterr().out
@@ -248,7 +248,7 @@ def test_the_command_writes_its_folder(rover, tmp_path, capsys, monkeypatch):
     assert content["cells"] > 0 and len(content["stretches"]["station_m"]) >= 4
     assert "no-score" in {remark["code"] for remark in content["remarks"]}
     for missing in (["none.toml"], [str(rover), "--from", "none.onnx"]):
-        assert main(["map", missing[0], "drive.csv", *missing[1:]]) == 2
+        assert main(["drive", "map", missing[0], "drive.csv", *missing[1:]]) == 2
         assert capsys.readouterr().err.count("\n") == 1
     text = (tmp_path / "drive.csv").read_text().replace("x_m", "east_m")
     (tmp_path / "drive.csv").write_text(text)
