@@ -27,7 +27,7 @@ friction_angle = [0.5, 0.7]
 slope = "3 deg"
 risk = 0.2
 """
-FEW = ["--designs", "6", "--draws", "50", "--sweep-only"]
+FEW = ["--designs", "6", "--draws", "50"]
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def test_the_answer_is_json_in_a_pipe(study, capsys):
     content = json.loads(printed(["plan", "wheels", study, *FEW, "--format", "json"], capsys).out)
     assert content["goal"]["slope_rad"] == pytest.approx(0.05236, abs=1e-5)
     assert content["soils"] == ["ding2015/hit_lss1"]
-    assert len(content["designs"]["width"]) == len(content["designs"]["probability"]) == 6
+    assert len(content["designs"]["width"]) == len(content["designs"]["probability"]) == 12
     best = content["best"]
     assert best["margin_N_p05"] < best["margin_N"] < best["margin_N_p95"]
     assert 0.0 < best["probability"] <= best["probability_climbed"] <= 1.0

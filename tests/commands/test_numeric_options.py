@@ -18,7 +18,7 @@ HOSTILE = ["nan", "inf", "-inf", "0", "-1", "1e-9", "1e9", "-1e9", "1e400", "x",
 OF_TEXT = {
     "init": ["--radius", "--width"],
     "simulate": ["--slip", "--load"],
-    "plan next": ["--slip", "--load", "--gravity", "--tested-at", "--radius"],
+    "plan next": ["--slip", "--load"],
     "pull": ["--load", "--slope", "--gravity", "--tested-at"],
     "paper walk": ["--legs", "--stiffness", "--slip"],
 }

@@ -148,9 +148,6 @@ LINES = {
     "plan next model.toml runs.csv --picture o.svg": "must end in .png",
     "plan next model.toml runs.csv -o runs.csv": "would be overwritten",
     "plan next rate.toml --load 60": "speed",
-    "plan next model.toml --gravity moon": "needs --target-load",
-    "plan next model.toml --gravity moon --target-load 20 --radius -1": "radius -1 m",
-    "plan next model.toml --load 20 --radius 0.1": "--radius needs --gravity",
     "pull model.toml runs.csv --gravity 0": "gravity is 0 m/s^2; it must lie between",
     "pull rover.toml runs.csv --gravity pluto": "one of earth, moon, mars",
     "pull model.toml runs.csv --gravity moon --gravity-law bekker": "one of open, constant",
@@ -162,11 +159,8 @@ LINES = {
     "pull model.toml runs.csv --load 0": "needed is a load above zero",
     "pull model.toml runs.csv --load much": "start:stop:count",
     "pull model.toml runs.csv --load 10:90:9": "at most 8",
-    "pull model.toml runs.csv --free cohesion --from x.onnx": "--free applies to the posterior",
-    "pull model.toml runs.csv --from none.onnx": "no such file",
     "pull model.toml runs.csv --slope 10": "--slope needs a model file with [rover]",
     "pull model.toml runs.csv --by run --picture p.png": "--picture draws one soil",
-    "pull model.toml runs.csv --from good.onnx --exact-model": "--exact-model applies to the rows",
     "bevameter runs.csv --format json -o soil.toml": "--format json and --out soil.toml differ",
 }
 

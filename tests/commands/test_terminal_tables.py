@@ -30,7 +30,8 @@ WORDS = {
     "bevameter": ["plates.csv"],
     "plan effects": ["m.toml", "runs.csv", "--ignore-extra", "-v"],
     "plan next": ["m.toml", "runs.csv"],
-    "plan wheels": ["rover.toml", "--designs", "9", "--draws", "50", "--sweep-only"],
+    "pull": ["m.toml", "runs.csv", "--load", "60", "--slip-limit", "0.3"],
+    "plan wheels": ["rover.toml", "--designs", "9", "--draws", "50"],
     "paper walk": ["--ground", "SSC-1,SSC-2", "--legs", "5"],
     "paper numbers": ["comin2017-slip"],
 }

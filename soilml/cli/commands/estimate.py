@@ -63,8 +63,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import deliver, show
     from soilml.cli.progress import progress_bar
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
+    from soilml.config.compatibility import recipe_case
     from soilml.config.remainder import SAME_ROWS
-    from soilml.experiment_design.expected_answers import trained_case
     from soilml.identification.model_error_inputs import (
         readings_with_model_error,
         trained_remainder,
@@ -111,8 +111,9 @@ def run(args: argparse.Namespace) -> int:
         return 0
     for estimator in estimators:
         check_table_wheel(estimator, table)
-    trained = None if case is not None else trained_case(estimators[0])
-    hinted = case if trained is None else trained[0]
+    hinted = case
+    if case is None and not estimators[0].per_row:
+        hinted = recipe_case(estimators[0].metadata["recipe"], estimators[0].path)
     print_table_hints(table, hinted, presentation.trained_radius(estimators[0]))
     pooled, first = args.by is not None, estimators[0]
     box = narrower_priors(first, case) if case is not None and pooled else {}
