@@ -1,32 +1,19 @@
-"""Bounded Levenberg-Marquardt descents of least-squares problems, many in step."""
+"""Bounded Levenberg-Marquardt descents of least-squares problems."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias, TypeVar
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.errors import InputError, raised
+from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate
-from soilml.fitting.least_squares import (
-    LeastSquaresProblem,
-    PriorTerms,
-    SoilTestTerms,
-    Solution,
-)
-from soilml.fitting.predictions import (
-    Linearisation,
-    PredictionRequest,
-    linearise_many,
-    predict_many,
-)
-
-T = TypeVar("T")
+from soilml.fitting.least_squares import LeastSquaresProblem, PriorTerms, Solution
+from soilml.fitting.predictions import Linearisation
 
 #: Iterations after which a descent is abandoned as not converged; typical fits need five to ten.
 MAX_ITERATIONS = 50
@@ -77,19 +64,16 @@ class DampedSteps:
 
     lower: Floats  # (p,) bounds, at which steps end
     upper: Floats
-    precision: Floats  # (p,) of each coordinate's normal density about zero, or 0
     #: (p,) What is added to a coordinate to obtain a multiple of the parameter, where the parameter
     #: moves by ratios; infinite where it moves by differences
     offset: Floats
-    #: Tests of the soil and priors, which stand beside the residuals
-    terms: SoilTestTerms | PriorTerms = field(default_factory=SoilTestTerms)
+    terms: PriorTerms  # Priors and tests of the soil, which stand beside the residuals
 
     @staticmethod
     def of(problem: LeastSquaresProblem) -> DampedSteps:
         """The steps of a problem."""
         offset = np.asarray([_offset(c) for c in problem.coordinates])
-        bounds = problem.lower, problem.upper
-        return DampedSteps(*bounds, problem.precision, offset, problem.terms)
+        return DampedSteps(problem.lower, problem.upper, offset, problem.terms)
 
     def within(self, x: Floats) -> Floats:
         """Coordinates (..., p), moved to the bounds that they are beyond."""
@@ -101,11 +85,11 @@ class DampedSteps:
         r"""What an undamped step from x (p,) promises, and where damped ones lead, (b, p).
 
         .. math:: (J^T J + P + \lambda\, \mathrm{diag}(J^T J + P))\, \Delta u
-            = J^T r - P_0 x - T^T z
+            = J^T r - T^T z
 
-        with the deviations z from soil tests, their derivatives T, the precision P_0 of the priors,
-        and P = P_0 + T^T T. Where a step meets a bound, the others are those that belong to it. The
-        promise is the decrease of the linearised objective, up to the bounds.
+        with the deviations z from priors and soil tests, their derivatives T, and P = T^T T. Where
+        a step meets a bound, the others are those that belong to it. The promise is the decrease of
+        the linearised objective, up to the bounds.
 
         residual (m,), jacobian (m, p): Whitened residuals and derivatives of the readings there.
         damping (b,): Factor lambda of each step.
@@ -136,7 +120,7 @@ class DampedSteps:
     def _descent(self, x: Floats, of_readings: Floats) -> Floats:
         """Half the negative gradient (b, p) at points (b, p), from that of the readings."""
         of_terms = [self.terms.rates(one).T @ self.terms.deviation(one) for one in x]
-        return of_readings - self.precision * x - np.stack(of_terms)
+        return of_readings - np.stack(of_terms)
 
     def _steps(self, x: Floats, descent: Floats, normal: Floats, damping: Floats) -> Floats:
         """Damped steps (b, p) from points (b, p).
@@ -162,7 +146,7 @@ class DampedSteps:
         gram (p, p): That of the readings.
         """
         rates = np.stack([self.terms.rates(one) for one in x])
-        return np.asarray(gram + np.diag(self.precision) + rates.swapaxes(1, 2) @ rates)
+        return np.asarray(gram + rates.swapaxes(1, 2) @ rates)
 
     def moved(self, x: Floats, step: Floats) -> Floats:
         """Coordinates (..., p) after steps: those that move by ratios follow an exponential."""
@@ -228,124 +212,50 @@ def _offset(coordinate: Coordinate) -> float:
     return prior.lower / (prior.upper - prior.lower)
 
 
+def descend_each(
+    problems: Sequence[LeastSquaresProblem],
+    starts: Sequence[Floats],
+    known: Sequence[Linearisation | None],
+) -> list[Solution | InputError]:
+    """Descents of problems from starts (p,); the error of one whose trials the model refuses."""
+    found: list[Solution | InputError] = []
+    for problem, start, near in zip(problems, starts, known, strict=True):
+        try:
+            found.append(descend(problem, start, near=near))
+        except InputError as error:
+            found.append(error)
+    return found
+
+
 def descend(
     problem: LeastSquaresProblem,
     start: Floats,
     tolerance: Tolerance = FINE,
     near: Linearisation | None = None,
 ) -> Solution:
-    """Bounded Levenberg-Marquardt descent from one start (p,); see `descend_together`.
-
-    near: A linearisation that saves the search for equilibrium, where it is at the start.
-
-    Raises `InputError` where the model refuses the coordinates of a trial.
-    """
-    (fit,) = in_step([descent(problem, start, near, tolerance)])
-    return raised(fit)
-
-
-def descend_together(
-    problems: Sequence[LeastSquaresProblem],
-    starts: Sequence[Floats],
-    known: Sequence[Linearisation | None] | None = None,
-) -> list[Solution | InputError]:
-    """Bounded Levenberg-Marquardt descents, in step, so that each call of the model serves all.
-
-    Each starts at coordinates (p,), clipped to the bounds. The descents are independent; the result
-    of each is that of a descent alone, within the tolerance of the search for equilibrium. Where
-    the model refuses the coordinates of a trial, its `InputError` takes the place of the solution.
-
-    known: Linearisations of the problems that may be at their starts; one that is spares the first
-        call of the model.
-
-    References: Nocedal and Wright, Numerical Optimization, 2006, section 10.3.
-    """
-    near = known or [None] * len(problems)
-    return in_step([descent(*own) for own in zip(problems, starts, near, strict=True)])
-
-
-@dataclass(frozen=True)
-class ModelQuestion:
-    """What a descent asks of the model: predictions, or a linearisation."""
-
-    request: PredictionRequest
-    linearise: bool
-
-
-#: Work that asks questions of the model, is sent the answers, and returns what it found. It may be
-#: several descents, one after the other.
-Asking: TypeAlias = Generator[ModelQuestion, Any, T]
-
-
-def in_step(works: Sequence[Asking[T]]) -> list[T | InputError]:
-    """What works return that go on in step, so that each call of the model serves all.
-
-    The `InputError` of a question that the model refuses is raised where it was asked; one that is
-    not caught there takes the place of the result.
-    """
-    results: dict[int, T | InputError] = {}
-    asked: dict[int, ModelQuestion] = {}
-    answers: dict[int, Any] = dict.fromkeys(range(len(works)))
-    while answers:
-        for i, answer in answers.items():
-            asked.pop(i, None)
-            refused = isinstance(answer, InputError)
-            try:
-                asked[i] = works[i].throw(answer) if refused else works[i].send(answer)
-            except StopIteration as end:
-                results[i] = end.value
-            except InputError as error:
-                results[i] = error
-        answers = _answers(asked) if asked else {}
-    return [results[i] for i in range(len(works))]
-
-
-def _answers(asked: Mapping[int, ModelQuestion]) -> dict[int, Floats | Linearisation | InputError]:
-    """The answers to the questions of one kind, predictions first.
-
-    Descents that ask for a linearisation wait until all do, so that one call serves them.
-    """
-    these = [i for i, question in asked.items() if not question.linearise]
-    answer: Callable[..., Sequence[Floats | Linearisation | InputError]] = predict_many
-    if not these:
-        these, answer = list(asked), linearise_many
-    return dict(zip(these, answer([asked[i].request for i in these]), strict=True))
-
-
-def descent(
-    problem: LeastSquaresProblem,
-    start: Floats,
-    known: Linearisation | None = None,
-    tolerance: Tolerance = FINE,
-) -> Asking[Solution]:
-    """One descent; see `descend_together`.
+    """Bounded Levenberg-Marquardt descent from one start (p,), moved within the bounds.
 
     As long as the linearised model keeps its promise, each iteration is one step, at the end of
     which the model is linearised again. Else several dampings are tried first and, where none keeps
     the promise, each with a correction by what of the model is not linear. Trials start at the
     sinkage that the last iterate predicts. An iterate is solved by the full search; it is no
     improvement where that finds an equilibrium before the one of the trial.
+
+    near: A linearisation that saves the search for equilibrium, where it is at the start.
+
+    Raises `InputError` where the model refuses the coordinates of a trial.
+
+    References: Nocedal and Wright, Numerical Optimization, 2006, section 10.3.
     """
     steps = DampedSteps.of(problem)
-
-    def at(last: Solution, x: Floats) -> ModelQuestion:
-        sinkage = last.linearisation.sinkage_at((x - last.x)[None, :])
-        return ModelQuestion(problem.request(x[None, :], sinkage), linearise=True)
-
-    def trials(last: Solution, x: Floats) -> ModelQuestion:
-        sinkage = replace(last.linearisation.sinkage_at(x - last.x), nearest=True)
-        return ModelQuestion(problem.request(x, sinkage), linearise=False)
-
     x = steps.within(start)
-    if known is None or not np.array_equal(known.x, x):
-        known = yield ModelQuestion(problem.request(x[None, :]), linearise=True)
-    last = problem.at(x, known)
+    known = near is not None and np.array_equal(near.x, x)
+    last = problem.at(x, near) if near is not None and known else problem.linearised(x)
     damping, converged, trusted = FIRST_DAMPING, False, True
     passed: deque[float] = deque(maxlen=tolerance.iterations)  # objectives before iterations
     for _ in range(MAX_ITERATIONS):
         excess = last.objective - len(last.residual)
-        factors = DAMPING_FACTORS[:1] if trusted else DAMPING_FACTORS
-        dampings = damping * np.asarray(factors)
+        dampings = damping * np.asarray(DAMPING_FACTORS)
         promised, here = steps.proposed(last.x, last.residual, last.jacobian, dampings)
         share = tolerance.share * excess
         given = passed[0] - last.objective if len(passed) == passed.maxlen else np.inf
@@ -355,25 +265,17 @@ def descent(
             break
         passed.append(last.objective)
         if trusted:
-            new = problem.at(here[0], (yield at(last, here[0])))
+            new = problem.linearised(here[0], last.linearisation)
             improvement = last.objective - new.objective
             trusted = improvement > KEPT_PROMISE * promised
             if improvement > 0.0:
                 last, damping = new, max(float(dampings[0]), MIN_DAMPING)
                 continue
-            dampings = damping * np.asarray(DAMPING_FACTORS)
-            _, here = steps.proposed(last.x, last.residual, last.jacobian, dampings)
-        bent = problem.whitened((yield trials(last, here)))
-        tried, objectives = here, problem.objective(bent, here)
-        if last.objective - float(objectives.min()) < KEPT_PROMISE * promised:
-            back = steps.corrected(last, here, bent, dampings)
-            straight = problem.whitened((yield trials(last, back)))
-            tried = np.vstack([here, back])
-            objectives = np.concatenate([objectives, problem.objective(straight, back)])
+        tried, objectives = _trials(problem, steps, last, here, dampings, KEPT_PROMISE * promised)
         best = int(np.argmin(objectives))
         improvement = last.objective - float(objectives[best])
         if improvement > 0.0:
-            new = problem.at(tried[best], (yield at(last, tried[best])))
+            new = problem.linearised(tried[best], last.linearisation)
             improvement = last.objective - new.objective
         if improvement <= 0.0:
             # if the most damped, shortest step is negligible this is an optimum; else damp more
@@ -388,3 +290,26 @@ def descent(
         if converged:
             break
     return replace(last, converged=converged)
+
+
+def _trials(
+    problem: LeastSquaresProblem,
+    steps: DampedSteps,
+    last: Solution,
+    here: Floats,
+    dampings: Floats,
+    enough: float,
+) -> tuple[Floats, Floats]:
+    """Points (b, p) and their objectives (b,): with corrected ones where none gives `enough`."""
+
+    def whitened(x: Floats) -> Floats:
+        sinkage = replace(last.linearisation.sinkage_at(x), nearest=True)
+        return problem.whitened(problem.predict(x, sinkage))
+
+    bent = whitened(here)
+    objectives = problem.objective(bent, here)
+    if last.objective - float(objectives.min()) >= enough:
+        return here, objectives
+    back = steps.corrected(last, here, bent, dampings)
+    corrected = problem.objective(whitened(back), back)
+    return np.vstack([here, back]), np.concatenate([objectives, corrected])
