@@ -11,7 +11,7 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.candidate_effects import gears_differ, with_effect
-from soilml.fitting.coordinates import Coordinate, size_coordinate
+from soilml.fitting.coordinates import size_coordinate
 from soilml.fitting.levels import covariate_levels
 from soilml.fitting.predictions import linearise, predict
 from soilml.fitting.readings import Readings

@@ -66,7 +66,7 @@ def predict(
     if not case.gears:
         load_case = _load_case(case, coordinates, x, readings.at)
         with np.errstate(all="ignore"):  # rows without an answer are flagged, not warned about
-            force = in_chunks_near(load_case, sensor_readings, _of_rows(start, slice(None)))
+            force = in_chunks_near(load_case, sensor_readings, _raveled(start))
         return _stacked(case, readings, force)
     y = np.full((len(x), len(readings)), np.nan)
     for part in _readings_by_gear(case, coordinates, readings):
@@ -172,12 +172,18 @@ def _readings_by_gear(
             yield _GearReadings(gear.case, free, at, own, gear.rows, chosen)
 
 
-def _of_rows(start: SinkageEstimate | None, rows: Integers | slice) -> SinkageEstimate | None:
-    """The estimate (sets, n) of some rows, one set after another, if there is one."""
+def _of_rows(start: SinkageEstimate | None, rows: Integers) -> SinkageEstimate | None:
+    """The estimate (sets, n) of some rows, if there is one."""
     if start is None:
         return None
-    log_sinkage, slope = start.log_sinkage[:, rows].ravel(), start.slope[:, rows].ravel()
-    return replace(start, log_sinkage=log_sinkage, slope=slope)
+    return replace(start, log_sinkage=start.log_sinkage[:, rows], slope=start.slope[:, rows])
+
+
+def _raveled(start: SinkageEstimate | None) -> SinkageEstimate | None:
+    """An estimate (sets, n) as one of the rows of all sets, if there is one."""
+    if start is None:
+        return None
+    return replace(start, log_sinkage=np.ravel(start.log_sinkage), slope=np.ravel(start.slope))
 
 
 def _load_case(case: Case, coordinates: Sequence[Coordinate], x: Floats, at: Operating) -> LoadCase:
@@ -216,7 +222,7 @@ def _linearised(
     sets, points = np.concatenate([x[None, :], x + np.diag(step)]), len(readings.run)
     load_case = _load_case(case, coordinates, sets, readings.at)
     base = np.tile(np.arange(points), len(sets))
-    response = linear_response(load_case, base, _of_rows(start, slice(None)))
+    response = linear_response(load_case, base, _raveled(start))
     here, *moved = _stacked(case, readings, response.force)
     change = np.reshape(moved, (len(x), len(here))) - here
     if np.any(np.isfinite(here) & ~np.isfinite(change.sum(axis=0))):

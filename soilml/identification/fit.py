@@ -276,9 +276,7 @@ def with_warnings(
     readings: Readings,
     free: Sequence[Coordinate],
     u: NDArray[np.float64],
-    *,
     excess_residuals: str,
-    undeclared: bool,
 ) -> Fit:
     """The same fit with its warnings.
 
@@ -308,8 +306,7 @@ def with_warnings(
     remarks += trade_offs(fit)
     if excess_residuals:
         remarks.append(excess_residuals_remark(float(np.sqrt(fit.misfit)), case, excess_residuals))
-    if undeclared:
-        names = readings.undeclared
+    if names := readings.undeclared:
         text = (
             f"noise of {', '.join(names)} is not declared: estimated from the residuals; declare "
             f'it in [noise] as {names[0]} = "2 %" or in its unit'

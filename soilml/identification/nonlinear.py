@@ -67,10 +67,10 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
             f"{readings.reading_count} readings cannot determine {len(free)} parameters and their "
             "own noise; declare it in [noise]"
         )
-    weighted, optimum = fit_under_declared_noise(case, readings, free)
+    optimum = fit_under_declared_noise(case, readings, free)
     with_prior = optimum
     if np.any(at_prior_bound(optimum.x)):
-        problem = replace(weighted.problem, priors="all")
+        problem = replace(optimum.problem, priors="all")
         with_prior = descend(problem, optimum.x, EXACT, optimum.linearisation)
     x = optimum.x
     found = Misfit.of(optimum, readings, len(free))
@@ -107,12 +107,4 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
         misfit=found.per_freedom if excess or found.freedom > 0 else float("nan"),
         channels=tuple(column(name) for name in readings.channels),
     )
-    return with_warnings(
-        fit,
-        case,
-        readings,
-        free,
-        x,
-        excess_residuals=WIDENED if excess else "",
-        undeclared=undeclared,
-    )
+    return with_warnings(fit, case, readings, free, x, WIDENED if excess else "")
