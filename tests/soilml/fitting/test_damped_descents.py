@@ -5,7 +5,7 @@ import pytest
 from gap_sets import MODEL, case_of, driven
 
 from soilml.fitting.coordinates import select_free
-from soilml.fitting.damped_descents import bounded_steps, descend, descend_each
+from soilml.fitting.damped_descents import bounded_step, descend, descend_each
 from soilml.fitting.least_squares import LeastSquaresProblem
 from soilml.fitting.readings import stack_readings
 
@@ -34,11 +34,8 @@ def test_a_step_that_meets_a_bound_goes_on_in_the_valley():
     """Along the valley u = v the minimum lies at 5; where u ends at 1, v ends nearby."""
     normal = np.asarray([[1.0, -0.99], [-0.99, 1.0]])
     descent = normal @ np.asarray([5.0, 5.0])
-    free, low = np.asarray([[True, True], [False, True], [True, True]]), np.full((3, 2), -1.0)
-    high = np.asarray([[1.0, 3.0], [1.0, 1.0], [9.0, 9.0]])
-    met, held, within = bounded_steps(
-        *(np.stack([a] * 3) for a in (normal, descent)), free, low, high
-    )
+    low, high = np.full(2, -1.0), ((1.0, 9.0), (0.0, 9.0), (9.0, 9.0))
+    met, held, within = (bounded_step(normal, descent, low, np.asarray(h)) for h in high)
     assert met == pytest.approx([1.0, 5.0 - 0.99 * 4.0])
     assert held == pytest.approx([0.0, descent[1]])
     assert within == pytest.approx([5.0, 5.0])
