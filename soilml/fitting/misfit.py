@@ -105,8 +105,8 @@ class Misfit:
     @staticmethod
     def of(optimum: Solution, readings: Readings, parameters: int) -> Misfit:
         """That of an optimum, of which the first coordinates are the parameters."""
-        squares = optimum.cost + readings.squares_within
-        count = readings.reading_count
+        squares = optimum.cost
+        count = len(readings)
         return Misfit(float(squares), count - parameters, count)
 
     @property
@@ -158,7 +158,7 @@ def declared_misfit(
     case: Case, readings: Readings, free: Sequence[Coordinate], start: Floats | None = None
 ) -> Misfit | None:
     """The misfit of rows of declared noise; None where it is not declared or no fit is possible."""
-    if readings.undeclared or not readings.reading_count:
+    if readings.undeclared or not len(readings):
         return None
     try:
         optimum = fit_under_declared_noise(case, readings, free, start)

@@ -27,20 +27,11 @@ Booleans = NDArray[np.bool_]
 #: Standard deviation, as a fraction of a channel's largest reading, up to which it counts as zero:
 #: below any sensor's resolution, and near the rounding errors of a prediction.
 LEAST_RELATIVE_STD = 1e-6
+#: Rows of one fit: the noise of more is far below the errors that rows share, and neighbours in a
+#: log are not independent.
+MOST_FITTED_ROWS = 2000
 #: Smallest standard deviation at a prediction, as a fraction of the channel's median one.
 LEAST_OF_MEDIAN = 1e-3
-
-
-@dataclass(frozen=True)
-class CondensedRows:
-    """What condensed rows stand for."""
-
-    rows: int  # numbers of measured rows, and of their readings
-    readings: int
-    #: Sum of the squared distances of the readings from those of their condensed rows, in standard
-    #: deviations of their noise
-    squares: float
-    undeclared: tuple[str, ...] = ()  # columns whose noise is that of their residuals
 
 
 @dataclass(frozen=True)
@@ -67,7 +58,6 @@ class Readings:
     #: Standard deviations of the errors that all rows share, by name: as [bias] declares them, or
     #: with those that sensors and models typically have
     shared_errors: Mapping[str, float] = field(default_factory=dict)
-    condensed: CondensedRows | None = None  # what the rows stand for, where many were condensed
 
     @staticmethod
     def of_every_row(
@@ -128,24 +118,12 @@ class Readings:
 
     @property
     def row_count(self) -> int:
-        """Number of measured rows."""
-        return len(self.row_slip) if self.condensed is None else self.condensed.rows
-
-    @property
-    def reading_count(self) -> int:
-        """Number of measured readings."""
-        return len(self) if self.condensed is None else self.condensed.readings
-
-    @property
-    def squares_within(self) -> float:
-        """Squared residuals, in standard deviations, that condensed rows no longer show."""
-        return 0.0 if self.condensed is None else self.condensed.squares
+        """Number of rows."""
+        return len(self.run)
 
     @property
     def undeclared(self) -> tuple[str, ...]:
         """Columns of the channels with a reading whose noise is not declared."""
-        if self.condensed is not None:
-            return self.condensed.undeclared
         unknown = np.unique(self.channel[~np.isfinite(self.std)])
         return tuple(column(self.channels[i]) for i in unknown)
 
@@ -191,8 +169,21 @@ class Readings:
             row=position[part.row],
             slip_std=self.slip_std[rows],
             load_std=self.load_std[rows],
-            condensed=None,
         )
+
+    def thinned(self) -> Readings:
+        """At most `MOST_FITTED_ROWS` rows, one from each of as many stretches of the table."""
+        if self.row_count <= MOST_FITTED_ROWS:
+            return self
+        width = self.row_count / MOST_FITTED_ROWS
+        place = np.random.default_rng(0).random(MOST_FITTED_ROWS)
+        rows = ((np.arange(MOST_FITTED_ROWS) + place) * width).astype(np.int64)
+        text = (
+            f"{MOST_FITTED_ROWS} of {self.row_count} rows are fitted, spread evenly over the table:"
+            " more would tell little beside the errors that all rows share"
+        )
+        notes = (*self.notes, Remark("rows-thinned", text, severity="note"))
+        return replace(self.of_rows(rows)[1], notes=notes)
 
     def subset(self, selected: Booleans) -> Readings:
         """The selected readings; all rows are retained."""

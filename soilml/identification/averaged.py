@@ -67,7 +67,7 @@ def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     if case.states_model_error:
         return posterior(case, readings, free)
     found = averaged_samples(case, readings, free)
-    excess = found.misfit > misfit_limit(readings.reading_count - len(free))
+    excess = found.misfit > misfit_limit(len(readings) - len(free))
     consequence = "the interval averages over what the model may lack" if excess else ""
     fit = fit_of_samples("averaged", found, case, readings, free, consequence)
     if sum(one.probability for one in found.explanations if one.exact) < constants.UNLIKELY_MODEL:

@@ -299,8 +299,8 @@ def with_warnings(
     if one_load and fraction <= WEAKLY_IDENTIFIED_ABOVE:
         text = "one load only: cohesion is determined by the change with slip alone"
         remarks.append(Remark("one-load", text, ("cohesion",)))
-    if readings.reading_count < len(free):
-        count = "1 reading" if readings.reading_count == 1 else f"{readings.reading_count} readings"
+    if len(readings) < len(free):
+        count = "1 reading" if len(readings) == 1 else f"{len(readings)} readings"
         text = f"{count} for {len(free)} parameters: the prior determines the rest"
         remarks.append(Remark("few-readings", text, fit.names))
     remarks += trade_offs(fit)

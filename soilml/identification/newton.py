@@ -63,10 +63,8 @@ def newton(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     law = getattr(gear, "braking", LinearWheel.braking)
     closed = LinearWheel(radius=gear.radius, width=gear.width, braking=law)
     case = replace(case, model=replace(case.model, gear=closed))
-    if readings.reading_count < 3:
-        raise FitError(
-            f"{readings.reading_count} readings: the Newton-Raphson method needs three or more"
-        )
+    if len(readings) < 3:
+        raise FitError(f"{len(readings)} readings: the Newton-Raphson method needs three or more")
     return with_fixed_parameter(case, "cohesion", lambda c: _solve(c, readings, free))
 
 

@@ -62,9 +62,9 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
     variance).
     """
     undeclared = bool(readings.undeclared)
-    if undeclared and readings.reading_count <= len(free):
+    if undeclared and len(readings) <= len(free):
         raise FitError(
-            f"{readings.reading_count} readings cannot determine {len(free)} parameters and their "
+            f"{len(readings)} readings cannot determine {len(free)} parameters and their "
             "own noise; declare it in [noise]"
         )
     optimum = fit_under_declared_noise(case, readings, free)

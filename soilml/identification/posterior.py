@@ -160,23 +160,20 @@ def posterior_samples(
     optimum = fit_under_declared_noise(case, readings, free)
     found = Misfit.of(optimum, readings, len(free))
     scale = found.factor if found.exceeds_noise else 1.0
-    sample = sample_posterior(optimum, readings.reading_count, scale)
+    sample = sample_posterior(optimum, scale)
     return PosteriorSamples(sample, found.per_freedom, scale)
 
 
-def sample_posterior(
-    optimum: Solution, reading_count: int, noise_scale: float = 1.0
-) -> ImportanceSample:
+def sample_posterior(optimum: Solution, noise_scale: float = 1.0) -> ImportanceSample:
     """Weighted fractions of the priors, under the declared noise times a factor.
 
     optimum: That of `fit_under_declared_noise`.
-    reading_count: Number of measured readings.
 
     Raises `FitError` as `posterior` does.
     """
     problem, p = optimum.problem, len(optimum.x)
     density = PosteriorDensity(problem, optimum.x, noise_scale)
-    if reading_count < FEW_READINGS:
+    if len(problem.readings) < FEW_READINGS:
         sample = importance_sample(density, p, most_samples=MOST_SAMPLES)
     else:
         best = descend(replace(problem, priors="all"), optimum.x, EXACT, optimum.linearisation)

@@ -25,7 +25,6 @@ from soilml.fitting.mixtures import with_all_effects
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.condensing import condensed
 from soilml.identification.fit import ignored_soil_tests
 from soilml.identification.model_error_inputs import (
     model_error_remarks,
@@ -69,7 +68,7 @@ def posterior_draws(
 
     Raises `FitError` as the posterior method does.
     """
-    found = posterior_samples(case, condensed(case, readings, free), free)
+    found = posterior_samples(case, readings.thinned(), free)
     return _soil_draws(free, found.sample.u[found.equally_weighted(count, seed)]), found
 
 
@@ -273,7 +272,7 @@ def _exact_soil(case: Case, table: Table, free: Sequence[str] | None) -> Measure
     case = one_of(case, "the case")
     unknown, whole = select_free(case, free), usable_readings(case, table)
     check_declared(whole)
-    samples = posterior_samples(case, condensed(case, whole, unknown), unknown)
+    samples = posterior_samples(case, whole.thinned(), unknown)
     x = samples.sample.u[samples.equally_weighted(DRAWS)]
     warnings = [*whole.notes]
     if samples.noise_inflated:

@@ -156,7 +156,7 @@ def test_a_narrow_and_bent_posterior_keeps_its_tails():
     free = select_free(case, None)
     readings = stack_readings(case, driven(case, loads=(60.0, 120.0), slips=10))
     optimum = fit_under_declared_noise(case, readings, free)
-    found = sample_posterior(optimum, len(readings))
+    found = sample_posterior(optimum)
     whole = importance_sample(PosteriorDensity(optimum.problem, optimum.x), len(free), seed=1)
     ends = np.asarray([0.02, 0.5, 0.98])
     std = np.sqrt(whole.mean((whole.u - whole.mean(whole.u)) ** 2))
