@@ -14,7 +14,7 @@ from soilml.fitting.candidate_effects import candidate_effects
 from soilml.fitting.coordinates import Coordinate, values_at
 from soilml.fitting.error_columns import shared_columns
 from soilml.fitting.global_optimum import raise_uncarried
-from soilml.fitting.misfit import Misfit, fit_under_declared_noise, misfit_limit
+from soilml.fitting.misfit import Misfit, fit_under_declared_noise
 from soilml.fitting.readings import Readings
 from soilml.identification.fit import Fit, SoilExplanation
 from soilml.identification.posterior import (
@@ -67,8 +67,7 @@ def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     if case.states_model_error:
         return posterior(case, readings, free)
     found = averaged_samples(case, readings, free)
-    excess = found.misfit > misfit_limit(len(readings) - len(free))
-    consequence = "the interval averages over what the model may lack" if excess else ""
+    consequence = "the interval averages over what the model may lack" if found.rejected else ""
     fit = fit_of_samples("averaged", found, case, readings, free, consequence)
     if sum(one.probability for one in found.explanations if one.exact) < constants.UNLIKELY_MODEL:
         text = "other explanations are a hundred times as likely as the model as in its file"
@@ -84,7 +83,7 @@ def averaged_samples(
 ) -> PosteriorSamples:
     """Weighted samples of the soil over all explanations of the rows; see `averaged`."""
     optimum = fit_under_declared_noise(case, readings, free)
-    misfit = Misfit.of(optimum, readings, len(free)).per_freedom
+    misfit = Misfit.of(optimum, readings, len(free))
     if readings.undeclared:
         std = np.where(np.isfinite(readings.std), readings.std, optimum.problem.readings.std)
         known = readings.from_case & np.isfinite(readings.std)
@@ -96,6 +95,8 @@ def averaged_samples(
         raise_uncarried(case, readings.at)
     if found.refused is not None:
         raise_uncarried(case, readings.at)
+    # residuals above the noise may be scatter of the soil from run to run, as `gap` decides too
+    rejected = misfit.exceeds_noise and found.no_gap <= constants.LIKELIER
     fixed, inner = shared_columns(found.soil.fit.fitted(), found.terms.readings, free)
     found = found.beside(fixed, inner)
     u, weights = map(
@@ -103,7 +104,7 @@ def averaged_samples(
     )
     weights = weights if weights.sum() > 0.0 else np.ones_like(weights)
     sample = ImportanceSample(u, weights / weights.sum(), 0.0)
-    return PosteriorSamples(sample, misfit, explanations=_explanations(found))
+    return PosteriorSamples(sample, misfit.per_freedom, rejected, explanations=_explanations(found))
 
 
 def soil_samples(

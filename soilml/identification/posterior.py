@@ -48,14 +48,11 @@ class PosteriorSamples:
     sample: ImportanceSample
     #: Squared residuals of the best fit in variances of the declared noise, per degree of freedom
     misfit: float
-    #: Factor on the declared noise: above 1 where the residuals exceed it significantly
-    noise_scale: float = 1.0
+    rejected: bool  # Whether the rows reject the model with all errors that the method knows
+    noise_scale: float = (
+        1.0  # Factor on the declared noise: above 1 where the rows reject the model
+    )
     explanations: tuple[SoilExplanation, ...] = ()  # That they average over, the likeliest first
-
-    @property
-    def noise_inflated(self) -> bool:
-        """Whether the residuals exceed the declared noise."""
-        return self.noise_scale > 1.0
 
     def equally_weighted(self, count: int, seed: int = 0) -> Integers:
         """Rows (count,) of the samples, as often as their weights say."""
@@ -107,7 +104,7 @@ def posterior(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
     39(4), 2012, for the sampling.
     """
     found = posterior_samples(case, readings, free)
-    excess = WIDENED if found.noise_inflated else ""
+    excess = WIDENED if found.rejected else ""
     return fit_of_samples("posterior", found, case, readings, free, excess)
 
 
@@ -161,7 +158,7 @@ def posterior_samples(
     found = Misfit.of(optimum, readings, len(free))
     scale = found.factor if found.exceeds_noise else 1.0
     sample = sample_posterior(optimum, scale)
-    return PosteriorSamples(sample, found.per_freedom, scale)
+    return PosteriorSamples(sample, found.per_freedom, found.exceeds_noise, scale)
 
 
 def sample_posterior(optimum: Solution, noise_scale: float = 1.0) -> ImportanceSample:

@@ -275,7 +275,7 @@ def _exact_soil(case: Case, table: Table, free: Sequence[str] | None) -> Measure
     samples = posterior_samples(case, whole.thinned(), unknown)
     x = samples.sample.u[samples.equally_weighted(DRAWS)]
     warnings = [*whole.notes]
-    if samples.noise_inflated:
+    if samples.rejected:
         consequence = "bands are widened and may be biased"
         warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
     residual = np.nan_to_num(whole.measured - predict(case, unknown, x, whole))
