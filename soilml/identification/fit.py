@@ -312,9 +312,6 @@ def with_warnings(
             f'it in [noise] as {names[0]} = "2 %" or in its unit'
         )
         remarks.append(Remark("undeclared-noise", text, names))
-    for name in readings.excluded_channels:
-        text = f"{name} is not used: its noise is not declared in [noise]"
-        remarks.append(Remark("unused-channel", text, (name,)))
     return replace(fit, warnings=(*fit.warnings, *remarks))
 
 
