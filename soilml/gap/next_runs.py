@@ -145,7 +145,7 @@ def _expected(
 
     def predicted(at: Operating, fit: Solution) -> Floats:
         rows = Readings.of_every_row(with_default_covariates(at, fit.case), like.channels)
-        return predict(fit.case, fit.coordinates, fit.x[None, :], rows)[0]
+        return np.asarray(predict(fit.case, fit.coordinates, fit.x[None, :], rows)[0])
 
     for option in options:
         changed = {name: _with_gear(fit, option) for name, fit in fits.items()}

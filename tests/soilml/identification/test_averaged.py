@@ -111,7 +111,7 @@ def test_identify_and_gap_of_the_same_rows_compute_one_posterior(monkeypatch):
 
 
 def test_scatter_of_the_soil_from_run_to_run_is_no_misfit():
-    """Residuals of twice the noise or more, which another soil in each run explains, as in `gap`."""
+    """Residuals of twice the noise or more, which another soil in each run explains."""
     case = case_of()
     factors = np.exp(0.05 * np.random.default_rng(101).standard_normal(6))
     loads, soils = (40.0, 60.0, 90.0, 140.0, 50.0, 75.0), {"kphi": case.soil.kphi * factors}
