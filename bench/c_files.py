@@ -133,7 +133,7 @@ def tasks(name: str, model: CompiledModel, estimator: Estimator) -> Any:
     if sets is None or name == "kls1_wheel":  # the rows are of another wheel
         return
     names = [*(SET_PREFIX + output for output in SET_OUTPUTS), *MEMORY_OUTPUTS]
-    update = getattr(library, f"{name}_set_update")
+    update = getattr(library, f"{name}_set_step")
     found, many = model.new("set_estimate"), readings()
     fields = [field for field, _ in model.structs[f"{name}_row"]._fields_]
 

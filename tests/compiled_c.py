@@ -114,12 +114,13 @@ class CompiledModel:
     def step(self, memory, rows):
         """Code, and which rows are in range."""
         inside = (ctypes.c_bool * max(len(rows), 1))()
-        return self.call("set_step", memory, rows, len(rows), inside, self.work), list(inside)
+        code = self.call("set_step", memory, rows, len(rows), inside, None, self.work)
+        return code, list(inside)
 
     def update(self, memory, rows):
         """Code and estimate of a step and its answer in one."""
         estimate = self.new("set_estimate")
-        code = self.call("set_update", memory, rows, len(rows), None, estimate, self.work)
+        code = self.call("set_step", memory, rows, len(rows), None, estimate, self.work)
         return code, as_arrays(estimate)
 
     def answer(self, memory):

@@ -41,7 +41,7 @@ int main(void)
         row.drawbar_pull = drive[i][3];
         if (i == 0 && (code = wheel_single(&row, &one, &work)) >= 0)
             print_estimate("one row", one.mean, one.std);
-        code = wheel_set_step(&memory, &row, 1, NULL, &work);
+        code = wheel_set_step(&memory, &row, 1, NULL, NULL, &work);
     }
     if (code >= 0 && (code = wheel_set_answer(&memory, &set, &work)) >= 0)
         print_estimate("six rows of one soil", set.mean, set.std);

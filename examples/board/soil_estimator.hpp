@@ -18,7 +18,7 @@ public:
     bool add(const any_wheel_row &row)
     {
         bool in_range = false;
-        check(any_wheel_set_step(&memory_, &row, 1, &in_range, &work()));
+        check(any_wheel_set_step(&memory_, &row, 1, &in_range, nullptr, &work()));
         return in_range;
     }
 

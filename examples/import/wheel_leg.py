@@ -271,7 +271,7 @@ def picture(files: list[Path], target: Path) -> None:
     """A run over time, and slip on board over slip."""
     import matplotlib.pyplot as plt
 
-    from soilml.log_import.figures import draw_run, run_panels
+    from soilml.log_import.import_report import draw_run, run_panels
     from soilml.report.figure_style import report_style
 
     imported = import_log(files, FOLDER / "map.toml")

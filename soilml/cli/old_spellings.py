@@ -38,7 +38,7 @@ OPTIONS: Mapping[str, Mapping[str, str]] = {
     "export soil": {"--run": "--group"},
     "paper numbers": {"--json": "--out"},
     "paper walk": {"--speed": "--angular-speed"},
-    "plan next": {"--slips": "--slip", "--loads": "--load", "--radii": "--radius"},
+    "plan next": {"--slips": "--slip", "--loads": "--load"},
 }
 
 

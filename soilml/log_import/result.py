@@ -77,7 +77,7 @@ class ImportedLog(Result):
 
     def report(self) -> Report:
         """Rows over slip, runs over time, what was left out, and what looks odd."""
-        from soilml.log_import.page import report_of_import
+        from soilml.log_import.import_report import report_of_import
 
         return report_of_import(self)
 
@@ -97,14 +97,6 @@ class ImportedLog(Result):
             "bias": {
                 key: {"share": n.share, "constant": n.constant} for key, n in self.bias.items()
             },
-            "shared_errors": [
-                {"constant": s.constant, "quantity": s.quantity, "rms": s.rms} for s in self.shared
-            ],
-            "left_out": [
-                {"run": run, "from_s": s.start, "until_s": s.stop, "why": s.why.as_json()}
-                for run, s in self.left_out()
-                if s.why is not None
-            ],
             "runs": [
                 {
                     "run": s.run,

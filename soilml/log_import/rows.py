@@ -58,7 +58,6 @@ class WheelSeries:
     """The quantities of one wheel in one run over time, and the stretches of the run."""
 
     run: str  # Name of the run in the table
-    drive: str  # Name of the run in the log; several wheels share it
     time: Floats  # Grid (n,), s
     quantities: dict[str, Floats]  # Samples (n,) by name
     stretches: tuple[Stretch, ...]  # Steady windows and what is left out
@@ -72,12 +71,21 @@ def by_name(dictionaries: Sequence[Mapping[str, float]]) -> dict[str, Floats]:
 
 
 def window_row(
-    window: Stretch, inputs: Inputs, series: Mapping[str, Floats], run: Run, conversion: Conversion
+    window: Stretch,
+    inputs: Inputs,
+    series: Mapping[str, Floats],
+    run: Run,
+    conversion: Conversion,
+    within: Stretch | None = None,
 ) -> WindowRow:
-    """The row of a window; `series` are the quantities over time."""
+    """The row of a window; `series` are the quantities over time.
+
+    Sensors are averaged over the part `within` it, else over all of it; slip is that of all of it.
+    """
     rows = inputs.within(window.start, window.stop)
+    part = rows if within is None else inputs.within(within.start, within.stop)
     means = {
-        role: float(np.nanmean(values[rows])) if np.isfinite(values[rows]).any() else float("nan")
+        role: float(np.nanmean(values[part])) if np.isfinite(values[part]).any() else float("nan")
         for role, values in inputs.values.items()
     } | inputs.constants
     slip_error = _exact_speeds(means, inputs, rows, conversion)
@@ -89,8 +97,8 @@ def window_row(
         # s = 1 - k driving, 1 / k - 1 braking
         std["slip"] = slip_error * (1.0 if values["slip"] >= 0.0 else (1.0 + values["slip"]) ** 2)
     for name in AVERAGED:
-        if name in series and series[name].ndim and np.isfinite(series[name][rows]).any():
-            mean, error, _ = mean_error(series[name][rows], inputs.step)
+        if name in series and series[name].ndim and np.isfinite(series[name][part]).any():
+            mean, error, _ = mean_error(series[name][part], inputs.step)
             if error > 1e-12 * abs(mean):
                 std[name] = error
     sizes = {name: float(np.nanmedian(v)) for name, v in _carried(run).items()}
@@ -223,35 +231,32 @@ def add_stated_errors(row: WindowRow, inputs: Inputs, conversion: Conversion) ->
             row.std[name] = float(np.hypot(row.std.get(name, 0.0), change))
 
 
-def irregular_windows(runs: Sequence[Sequence[WindowRow]]) -> dict[tuple[int, int], Remark]:
-    """Reasons by (run, window) for windows that are irregular in slip or in drawbar pull.
+def irregular_windows(rows: Sequence[WindowRow]) -> dict[int, Remark]:
+    """Reasons by place for windows of a run that are irregular in slip or in drawbar pull.
 
     The wandering of a window is the standard error of its mean times the square root of its
     length, which does not depend on the length. Hands on the carriage, a cable that tightens or a
     wheel that meets a stone raise it. A window is judged by the others of its own run, and in a run
     of few windows by what no rig shows, so that it stays or goes whatever else is imported.
     """
-    found: dict[tuple[int, int], Remark] = {}
+    found: dict[int, Remark] = {}
     for name, least in (("drawbar_pull", 0.0), ("slip", _LEAST_ERROR)):
-        for i, rows in enumerate(runs):
-            errors = np.asarray([row.std.get(name, np.nan) for row in rows])
-            wandering = errors * np.sqrt([row.window.stop - row.window.start for row in rows])
-            few = np.isfinite(errors).sum() < _FEWEST
-            if few:
-                loads = [row.values.get("load", np.nan) for row in rows]
-                one = np.abs(loads) if name == "drawbar_pull" else np.ones(len(rows))
-                usual, limits = _MOST_WANDERING * one, _MOST_WANDERING * one
-            else:
-                usual = np.full(len(rows), float(np.nanmedian(wandering)))
-                limits = _TIMES * usual
-            for k in np.flatnonzero((wandering > limits) & (errors > least)):
-                text = (
-                    f"it is irregular: the {name.replace('_', ' ')} wanders "
-                    f"{wandering[k] / usual[k]:.2g} times as much as "
-                    f"{'windows of any rig at most do' if few else 'in the middle of the windows'}"
-                    ", as if someone had touched the rig"
-                )
-                found[(i, int(k))] = Remark("irregular", text, (name,))
+        errors = np.asarray([row.std.get(name, np.nan) for row in rows])
+        wandering = errors * np.sqrt([row.window.stop - row.window.start for row in rows])
+        if np.isfinite(errors).sum() < _FEWEST:
+            times, other = 1.0, "windows of any rig at most do"
+            loads = np.abs([row.values.get("load", np.nan) for row in rows])
+            usual = _MOST_WANDERING * (loads if name == "drawbar_pull" else np.ones(len(rows)))
+        else:
+            times, other = _TIMES, "in the middle of the windows"
+            usual = np.full(len(rows), float(np.nanmedian(wandering)))
+        for k in np.flatnonzero((wandering > times * usual) & (errors > least)):
+            text = (
+                f"it is irregular: the {name.replace('_', ' ')} wanders "
+                f"{wandering[k] / usual[k]:.2g} times as much as {other}, as if someone had "
+                "touched the rig"
+            )
+            found[int(k)] = Remark("irregular", text, (name,))
     return found
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.errors import InputError, SoilmlError
 from soilml.io.table import TEXT, Table, text_column
-from soilml.log_import.guesses.columns import parts_of, words_of
 from soilml.log_import.guesses.constants import agreed_constants, stated_radius
+from soilml.log_import.guesses.role_words import parts_of, words_of
 from soilml.log_import.readers import read_log
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import dimension, factor, unit_in_name
@@ -26,15 +26,17 @@ _STEM = 4  # Fewest letters of a word that others may begin with
 #: Columns by which a table is one of tests, and not of the runs of a wheel.
 _OF_TESTS = (
     {"shear_stress_Pa"}, {"torque_Nm", "angle_rad"}, {"torque_Nm", "outer_radius_m"},
-    {"pressure_Pa"},
+    {"pressure_Pa"}, {"load_N", "plate_radius_m"}, {"load_N", "plate_width_m"},
+    {"load_N", "plate_area_m2"},
 )  # fmt: skip
 #: Columns that a simulator with z upward has below zero.
 _UPWARD = ("sinkage_m", "displacement", "load_N")
-_OF_A_PLATE = ("plate_length_m", "sinkage_m")
-_PLATES = {"plate_radius_m", "plate_diameter", "plate_width_m", "plate_area_m2"}
+_PLATES = ("plate_radius_m", "plate_width_m", "plate_area_m2")
+#: What no column beside a shear stress is.
+_OF_A_PLATE = ("plate_length_m", "sinkage_m", *_PLATES[:2])
 #: How far a test advances, what is constant in it, and the share by which these jump to the next.
-_ADVANCE = ("shear_displacement_m", "sinkage_m", "displacement", "angle_rad")
-_CONSTANT, _BACK, _OTHER, _SELDOM = ("normal_stress_Pa", *sorted(_PLATES)), 0.5, 0.1, 0.25
+_ADVANCE = ("shear_displacement_m", "sinkage_m", "angle_rad")
+_CONSTANT, _BACK, _OTHER, _SELDOM = ("normal_stress_Pa", *_PLATES), 0.5, 0.1, 0.25
 
 
 @cache
@@ -79,27 +81,76 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
         recordings = read_log(Path(path))
     except SoilmlError:
         return None
-    if len(recordings) != 1 or not recordings[0].columns:
+    own, name = recordings[0], str(path)
+    if len(recordings) != 1 or not own.columns:
         return None
-    own = recordings[0]
     if any(n not in TEXT and n.removesuffix("_std") in COLUMNS for n in own.columns):
         return None
     if any(_says(n, "vane") for n in own.columns):
         raise InputError(
-            f"{path}: vane tests are not read: they give the undrained strength alone; needed are "
+            f"{name}: vane tests are not read: they give the undrained strength alone; needed are "
             "plate, shear or triaxial tests"
         )
-    if circles := _circles(path, own):
+    if circles := _circles(name, own):
         return circles
-    sheared = any(_says(name, "shear", "across") for name in own.columns)
-    found, taken, left_out = _taken(path, own, sheared)
+    sheared = any(_says(n, "shear", "across") for n in own.columns)
+    found, taken, left_out = _taken(name, own, sheared)
+    _complete(name, own, found, taken)
+    if not any(needed <= found.keys() for needed in _OF_TESTS):
+        return None
+    label, names = _names(own, found)
+    count = len({*names})
+    counted = "one test" if count == 1 else f"{count} tests, divided where they start again"
+    taken.insert(0, f"test = {label!r}" if label else counted)
+    tests = text_column(names, lambda i: f"{name}, row {i + 1} of the tests, column {label!r}")
+    columns, lines = {"test": tests, **found}, np.arange(1, len(own) + 1)
+    return SoilTests(Table(columns, name, lines), tuple(taken), tuple(left_out))
+
+
+def _taken(
+    path: str, own: Recording, sheared: bool
+) -> tuple[dict[str, Floats], list[str], list[str]]:
+    """Our columns, what was taken for what, and what was left out."""
+    found: dict[str, Floats] = {}
+    taken, left_out = [], []
+    # of two stresses, the strength comes before the residual one, and the shearing before what
+    # consolidated the sample
+    for name, values in sorted(own.columns.items(), key=lambda c: _says(c[0], "second")):
+        unit = _unit(own, name)
+        kind = dimension(unit) if unit else None
+        weight = 9.80665 if kind == "kg" else 1.0  # a scale that shows the force in kg
+        column, ours = _quantity(name, "N" if kind == "kg" else kind, {*found}, sheared)
+        if not column:
+            if not _says(name, "test"):
+                left_out.append(repr(name))
+            continue
+        if not unit:
+            raise InputError(
+                f"{path}: the column {name!r} states no unit; needed is one in its name, such as "
+                f"'{name} [mm]' or '{name} [kPa]', or the columns of `soilml bevameter --help`"
+            )
+        half = column.endswith("_radius_m") and (
+            _says(name, "diameter") or {*words_of(name)} & {"id", "od"}
+        )
+        share = weight * (0.5 if half else 1.0)
+        if column in _UPWARD and np.any(values) and not np.any(values > 0.0):
+            share = -share
+        size = factor(unit, "kg" if kind == "kg" else ours, f"{path}, column {name!r}")
+        column = _of_displacement(sheared) if column == "displacement" else column
+        found[column] = share * values * size
+        sign = "-" * (share < 0.0) + "2 " * bool(half)
+        taken.append(f"{sign}{column} = {name!r} ({unit})")
+    return found, taken, left_out
+
+
+def _complete(path: str, own: Recording, found: dict[str, Floats], taken: list[str]) -> None:
+    """Add what follows from the columns: the size of a plate, and stresses from forces."""
     if "plate_radius_m" in found and "plate_length_m" in found and "plate_width_m" not in found:
         found["plate_width_m"] = found.pop("plate_radius_m")  # b of a strip is its width
     if "pressure_Pa" in found and "plate_width_m" in found:
         found.setdefault("plate_length_m", found["plate_width_m"])  # a pressure needs no area
-    of_plates = not sheared and {"sinkage_m", "displacement"} & found.keys()
-    if of_plates and not _PLATES & found.keys():
-        if radius := stated_radius(agreed_constants([recordings]).common):
+    if "sinkage_m" in found and not {*_PLATES} & found.keys():
+        if radius := stated_radius(agreed_constants([[own]]).common):
             found["plate_radius_m"] = np.full(len(own), radius)
             taken.append(f"plate_radius_m = {radius:g} m, as the file or its name states")
         elif "load_N" in found and any(_says(name, "plates") for name in own.columns):
@@ -116,55 +167,6 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
         for force, stress in (("shear_force", "shear_stress_Pa"), ("load_N", "normal_stress_Pa")):
             if force in found:
                 found[stress] = found.pop(force) / area
-    plates = "load_N" in found and bool(_PLATES & found.keys())
-    if not plates and not any(needed <= found.keys() for needed in _OF_TESTS):
-        return None
-    label, names = _names(own, found)
-    count = len({*names})
-    counted = "one test" if count == 1 else f"{count} tests, divided where they start again"
-    taken.insert(0, f"test = {label!r}" if label else counted)
-    if "plate_diameter" in found:
-        found["plate_radius_m"] = found.pop("plate_diameter") / 2.0
-    if "displacement" in found:
-        found.setdefault(_our_name("displacement", sheared), found.pop("displacement"))
-    tests = text_column(names, lambda i: f"{path}, row {i + 1} of the tests, column {label!r}")
-    columns, lines = {"test": tests, **found}, np.arange(1, len(own) + 1)
-    return SoilTests(Table(columns, str(path), lines), tuple(taken), tuple(left_out))
-
-
-def _taken(
-    path: str | os.PathLike[str], own: Recording, sheared: bool
-) -> tuple[dict[str, Floats], list[str], list[str]]:
-    """Our columns, what was taken for what, and what was left out."""
-    found: dict[str, Floats] = {}
-    taken, left_out = [], []
-    # of two stresses, the strength comes before the residual one, and the shearing before what
-    # consolidated the sample
-    for name, values in sorted(own.columns.items(), key=lambda c: _says(c[0], "second")):
-        unit = _unit(own, name)
-        kind = dimension(unit) if unit else None
-        weight = 9.80665 if kind == "kg" else 1.0  # a scale that shows the force in kg
-        column, ours = _quantity(name, "N" if kind == "kg" else kind, {*found}, sheared)
-        if not column:
-            if "test" in found or not _says(name, "test"):
-                left_out.append(repr(name))
-            continue
-        if not unit:
-            raise InputError(
-                f"{path}: the column {name!r} states no unit; needed is one in its name, such as "
-                f"'{name} [mm]' or '{name} [kPa]', or the columns of `soilml bevameter --help`"
-            )
-        half = column.endswith("r_radius_m") and (
-            _says(name, "diameter") or {*words_of(name)} & {"id", "od"}
-        )
-        share = weight * (0.5 if half else 1.0)
-        if column in _UPWARD and np.any(values) and not np.any(values > 0.0):
-            share = -share
-        size = factor(unit, "kg" if kind == "kg" else ours, f"{path}, column {name!r}")
-        found[column] = share * values * size
-        sign = "-" * (share < 0.0) + "2 " * bool(half)
-        taken.append(f"{sign}{_our_name(column, sheared)} = {name!r} ({unit})")
-    return found, taken, left_out
 
 
 def _unit(own: Recording, name: str) -> str:
@@ -200,23 +202,23 @@ def _quantity(name: str, kind: str | None, have: set[str], sheared: bool) -> tup
     if sheared and across and (kind == "m" or (kind is None and _says(name, "ways"))):
         return "", ""
     for column, (unit, known) in _known()[0].items():
-        if sheared and (column in _PLATES - {"plate_area_m2"} or column in _OF_A_PLATE):
+        if sheared and column in _OF_A_PLATE:
             continue
         if kind not in (None, unit) or not _has(name, known, _STEM + 1 if kind is None else 1):
             continue
-        if column not in have:
-            taken = {"displacement", _our_name("displacement", sheared)} & have
-            return ("", "") if column == "displacement" and taken else (column, unit)
-        if _says(name, "shear", "second", "vertical") and kind == "Pa":
+        ours = _of_displacement(sheared) if column == "displacement" else column
+        if ours not in have:
+            return column, unit
+        if column == "displacement" or (
+            _says(name, "shear", "second", "vertical") and kind == "Pa"
+        ):
             break
     return "", ""
 
 
-def _our_name(column: str, sheared: bool) -> str:
-    """The name in soilml; a displacement is that of the shear where there is a shear stress."""
-    ours = {"plate_diameter": "2 plate_radius_m",
-            "displacement": "shear_displacement_m" if sheared else "sinkage_m"}  # fmt: skip
-    return ours.get(column, column)
+def _of_displacement(sheared: bool) -> str:
+    """What a displacement is: that of the shear where there is a shear stress."""
+    return "shear_displacement_m" if sheared else "sinkage_m"
 
 
 def _names(own: Recording, found: dict[str, Floats]) -> tuple[str, list[str]]:
@@ -249,7 +251,7 @@ def _starts(found: dict[str, Floats], count: int) -> np.ndarray:
     return starts
 
 
-def _circles(path: str | os.PathLike[str], own: Recording) -> SoilTests | None:
+def _circles(path: str, own: Recording) -> SoilTests | None:
     """Triaxial tests as points of failure; None where the columns are of no triaxial test."""
     columns = dict(_triaxial(own))
     if "cell" not in columns or not {"deviator", "axial"} & columns.keys():
@@ -261,7 +263,7 @@ def _circles(path: str | os.PathLike[str], own: Recording) -> SoilTests | None:
 
     cell, pore = read("cell"), read("pore") if "pore" in columns else 0.0
     deviator = read("deviator") if "deviator" in columns else read("axial") - cell
-    label, names = _names(own, {"displacement": cell} if len(own) > np.unique(cell).size else {})
+    label, names = _names(own, {"sinkage_m": cell} if len(own) > np.unique(cell).size else {})
     if not label:
         names = [f"{round(pressure / 100.0) / 10:g} kPa" for pressure in cell]
     tests = list(dict.fromkeys(names))
@@ -281,7 +283,7 @@ def _circles(path: str | os.PathLike[str], own: Recording) -> SoilTests | None:
     said = ", ".join(f"{key} = {name!r}" for key, name in columns.items())
     taken = (f"{len(tests)} triaxial tests, of which the circles of failure count", said)
     left = tuple(repr(n) for n in own.columns if n not in columns.values() and n != label)
-    return SoilTests(Table(points, str(path), np.arange(1, len(tests) + 1)), taken, left)
+    return SoilTests(Table(points, path, np.arange(1, len(tests) + 1)), taken, left)
 
 
 def _triaxial(own: Recording) -> Iterator[tuple[str, str]]:

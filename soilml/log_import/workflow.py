@@ -12,7 +12,7 @@ from soilml.errors import FitError, InputError
 from soilml.io.table import Table
 from soilml.log_import.channels.runs import runs_of, runs_of_rows
 from soilml.log_import.channels.wheel_quantities import largest_errors, wheels_by_gear
-from soilml.log_import.guesses.columns import is_size
+from soilml.log_import.guesses.role_words import is_size
 from soilml.log_import.mapping.log_map import LogMap, map_from, read_map
 from soilml.log_import.readers import Progress, read_logs, silent
 from soilml.log_import.readers.side_files import log_files
@@ -66,24 +66,15 @@ def import_log(
     MissingLibraryError
         Where a reader's library is not installed.
     """
-    said = progress or silent
-    files = log_files(logs)
-    if not isinstance(log_map, LogMap):
-        log_map = map_from(log_map) if isinstance(log_map, Mapping) else read_map(log_map)
-    return import_recordings(read_logs(files, said), log_map, accept, said)
-
-
-def import_recordings(
-    recordings: Sequence[Sequence[Recording]],
-    found: LogMap,
-    accept: bool = False,
-    progress: Progress = silent,
-) -> ImportedLog:
-    """What `import_log` gives, of logs that are read already; raises as it does."""
-    steady = found.runs.each_row
+    said, files = progress or silent, log_files(logs)
+    if isinstance(log_map, LogMap):
+        found = log_map
+    else:
+        found = map_from(log_map) if isinstance(log_map, Mapping) else read_map(log_map)
+    recordings, steady = read_logs(files, said), found.runs.each_row
     runs = runs_of_rows(recordings, found) if steady else runs_of(recordings, found)
     parts = [part for w in found.wheels for part in wheels_by_gear(found, w, runs)]
-    wheels = [WheelRows(found, wheel, [runs[i] for i in own], progress) for wheel, own in parts]
+    wheels = [WheelRows(found, wheel, [runs[i] for i in own], said) for wheel, own in parts]
     # by run: its wheels, each in the analysis that has its gear, and the run's place there
     by_run = [
         (run, wheel, own.index(i))
@@ -94,7 +85,7 @@ def import_recordings(
     wrong = [hint for wheel in wheels for hint in wheel.hints()]
     if wrong and not accept:
         raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
-    groups = [(w.wheel, run, w.kept[k]) for run, w, k in by_run]
+    groups = [(w.wheel, run, w.runs[k].kept) for run, w, k in by_run]
     table = rows_as_table(groups, found.source, timed=not steady)
     remarks = [remark for wheel in wheels for remark in wheel.remarks()]
     if len(table) == 0:
@@ -122,7 +113,7 @@ def import_recordings(
 def _most_frequent(wheels: Sequence[WheelRows]) -> str:
     """The reason for which most of the time was left out."""
     seconds: dict[Remark | None, float] = {}
-    for s in (s for wheel in wheels for own in wheel.stretches for s in own):
+    for s in (s for wheel in wheels for one in wheel.runs for s in one.stretches):
         seconds[s.why] = seconds.get(s.why, 0.0) + s.stop - s.start
     most = max(seconds, key=lambda why: seconds[why], default=None)
     return most.text if most else "the logs are empty"

@@ -21,27 +21,24 @@ LEAST_STD_RATIO = 1e-3
 def gaussian_product(
     mean: Floats, covariance: Floats, prior: PriorSummary, weight: float = 1.0
 ) -> tuple[Floats, Floats]:
-    r"""Mean (..., q) and covariance (..., q, q) of m estimates, with their common prior once.
+    r"""Mean (q,) and covariance (q, q) of estimates (m, q), with their common prior once.
 
     .. math::
         P^{-1} = P_0^{-1} + w \sum_i (P_i^{-1} - P_0^{-1}), \quad
         P^{-1} \mu = P_0^{-1} \mu_0 + w \sum_i (P_i^{-1} \mu_i - P_0^{-1} \mu_0)
 
-    Directions in which an estimate is no more certain than the prior contribute nothing.
-
-    mean, covariance: Estimates (..., m, q) and (..., m, q, q).
-    weight: Share w of their information that is used.
+    Directions in which an estimate is no more certain than the prior contribute nothing. The share
+    w of their information is used.
 
     References: Tresp, Neural Computation 12, 2000.
     """
     variance, axes = np.linalg.eigh(covariance / np.outer(prior.std, prior.std))
     precision = 1.0 / np.clip(variance, LEAST_STD_RATIO**2, 1.0)
-    scaled = np.einsum("...ji,...j->...i", axes, (mean - prior.mean) / prior.std)
-    right = weight * np.einsum("...mij,...mj->...i", axes, precision * scaled)
-    added = weight * np.einsum("...mik,...mk,...mjk->...ij", axes, precision - 1.0, axes)
+    scaled = np.einsum("mji,mj->mi", axes, (mean - prior.mean) / prior.std)
+    right = weight * np.einsum("mij,mj->i", axes, precision * scaled)
+    added = weight * np.einsum("mik,mk,mjk->ij", axes, precision - 1.0, axes)
     inverse = np.linalg.inv(np.eye(len(prior.std)) + added)
-    centre = np.einsum("...ij,...j->...i", inverse, right)
-    return prior.mean + prior.std * centre, inverse * np.outer(prior.std, prior.std)
+    return prior.mean + prior.std * (inverse @ right), inverse * np.outer(prior.std, prior.std)
 
 
 def product_of_rows(single: Estimate) -> Estimate:
@@ -51,20 +48,18 @@ def product_of_rows(single: Estimate) -> Estimate:
     :math:`m / (1 + (m - 1) \rho)` independent ones. The answer is the prior where more than half of
     the rows are out of range.
     """
-    valid = single.in_range
-    used, head = int(valid.sum()), (single.names, single.units, single.prior)
+    valid, prior = single.in_range, single.prior
     if valid.size == 1:
         return single.at(0)
+    used, head = int(valid.sum()), (single.names, single.units, prior)
     found = Estimate.from_prior(*head)
     if used >= LEAST_SHARE_IN_RANGE * valid.size:
         weight = 1.0 / (1.0 + (used - 1) * CORRELATION)
-        parts = single.mean[valid], single.covariance[valid]
-        mean, covariance = gaussian_product(*parts, single.prior, weight)
-        mean, std = (
-            np.clip(mean, single.prior.lower, single.prior.upper),
-            np.sqrt(np.diag(covariance)),
+        mean, covariance = gaussian_product(
+            single.mean[valid], single.covariance[valid], prior, weight
         )
-        factor = np.full(len(std), Z_90)
+        std, factor = np.sqrt(np.diag(covariance)), np.full(len(prior.std), Z_90)
+        mean = np.clip(mean, prior.lower, prior.upper)
         found = Estimate.gaussian(*head, mean, covariance, std, np.asarray(True), factor)
     aside = np.asarray(valid.size - used)
     return replace(found, rows_used=np.asarray(used), rows_set_aside=aside)

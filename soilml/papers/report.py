@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from soilml.papers.published import ORDINAL, PAPERS, Comparison, count_statuses
+from soilml.papers.published import ORDINAL, PAPERS, STATUSES, Comparison, count_statuses
 from soilml.report.report import Report
 from soilml.report.tables import Column, ReportTable
 
@@ -52,6 +52,7 @@ def number_report(found: Sequence[Comparison]) -> Report:
         status="wrong" if wrong else "as claimed",
         tone="bad" if wrong else "good",
         title="Printed numbers of the source papers",
+        notation=[(code.replace("_", " "), words) for code, words in STATUSES.items()],
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.quantities import QUANTITIES
 from soilml.remarks import Remark
-from soilml.report.figure_style import UNCHANGED, short_label, take_axes
+from soilml.report.figure_style import UNCHANGED, short_label
 from soilml.report.numbers import format_quantity
 from soilml.report.report import Picture, Report
 from soilml.report.tables import Column, ReportTable
@@ -80,14 +80,13 @@ def _table(own: Sequence[MethodResult], names: Sequence[str]) -> ReportTable:
     return ReportTable(own[0].design, columns)
 
 
-def plot_comparison(results: Sequence[MethodResult], names: Sequence[str], ax: Any = None) -> Any:
+def _draw(results: Sequence[MethodResult], names: Sequence[str], axes: NDArray[Any]) -> None:
     """Draw the RMSE over the prior's standard deviation, and the coverage of 90 % intervals.
 
-    `ax` takes two axes for each of q parameters; a new figure where None. Returns them, (2, q).
+    axes: Two for each of q parameters, (2, q).
     """
     designs = list(dict.fromkeys(r.design for r in results))
     methods = [m for m in dict.fromkeys(r.method.label for r in results) if m != "prior"]
-    axes: NDArray[Any] = take_axes(ax, 2, len(names), _size(names))
     for k, name in enumerate(names):
         error, coverage = axes[0][k], axes[1][k]
         error.axhline(1.0, color=UNCHANGED, lw=1, ls="--", label="prior")
@@ -111,11 +110,6 @@ def plot_comparison(results: Sequence[MethodResult], names: Sequence[str], ax: A
         error.set_ylabel("RMSE / prior standard deviation")
         coverage.set_ylabel("coverage of 90 % interval")
     axes[0][0].legend(fontsize=7)
-    return axes
-
-
-def _size(names: Sequence[str]) -> tuple[float, float]:
-    return PANEL[0] * len(names), 2 * PANEL[1]
 
 
 def _first_of_each(results: Sequence[MethodResult]) -> list[MethodResult]:
@@ -139,8 +133,8 @@ def comparison_report(results: Sequence[MethodResult], names: Sequence[str], tes
         tables=[_table(own, names) for own in designs],
         pictures=[
             Picture(
-                "Errors and coverage", partial(plot_comparison, results, names), 2, len(names),
-                _size(names), verdict,
+                "Errors and coverage", partial(_draw, results, names), 2, len(names),
+                (PANEL[0] * len(names), 2 * PANEL[1]), verdict,
                 "RMSE over the prior's standard deviation (top; dashed: the prior) and coverage of "
                 "90 % intervals (bottom; green: 88 to 92 %) against the number of readings per "
                 "set. Squares: analytic methods.",

@@ -13,7 +13,6 @@ import numpy as np
 from soilml import __version__
 from soilml.onboard.metadata import read_fields
 from soilml.onboard.set_contract import (
-    MODEL_ERROR_COLUMNS,
     SET_SWITCH,
 )
 from soilml.onboard.tracking.soil_tracker import DEFAULT_LENGTH
@@ -135,7 +134,6 @@ def write_c(
         "factors": fields["coverage_factor"].tolist(),
         "z90": Z_90,
         "scalars": SCALARS,
-        "exact_columns": interface.columns - len(MODEL_ERROR_COLUMNS),
         "least_share": fields["sets"].least_share_in_range if fields["sets"] else 0.0,
         "tracker": tracker_values(interface, noise, memory, length) if sets else None,
         **common,

@@ -74,6 +74,83 @@ class SetFunctions:
         return [self.row, self.set, self.once, self.soil, self.answer]
 
 
+class _SetGraph:
+    """The graph of a set posterior between its composites, and where C has its values.
+
+    Raises `ModelFileError` for a graph without the composites: one of an earlier version.
+    """
+
+    def __init__(self, model: Any, interface: Interface, shared: SharedParts, name: str) -> None:
+        shapes, kinds = input_shapes(model), (SOUND, FIRST, LIKELIEST, POSTERIOR)
+        self.known = {SET_SWITCH: Tensor.constant(np.ones(1, np.bool_))}
+        self.nodes, self.shared = flat_nodes(model.graph, self.known), shared
+        self.calls = {node.op_type: node for node in self.nodes if node.op_type in kinds}
+        if not {SOUND, FIRST, POSTERIOR} <= {*self.calls}:
+            raise ModelFileError(EARLIER)
+        inputs = {f.name: f.input for f in model.functions}
+        #: what each composite is given, by the names in it
+        self.given = {
+            kind: dict(zip(inputs[kind], node.input, strict=True))
+            for kind, node in self.calls.items()
+        }
+        self.of_rows = {
+            field.name: Tensor(f"(&work->readings[{k}][r])", shapes[field.name][0], (1,))
+            for k, field in enumerate(interface.rows)
+        }
+        self.of_set = {
+            field.name: Tensor(f"(&memory->context.{field.name})", shapes[field.name][0], (1,))
+            for field in interface.context
+        }
+        # which a check leaves out
+        self.of_set[MODEL_ERROR_INPUT] = Tensor("work->size", "float", (1,))
+        for fed in (*self.of_rows, *self.of_set):
+            self.known.pop(fed, None)
+        self.counted = next(n.output[0] for n in self.nodes if MEMORY_OUTPUTS[1] in n.output[0])
+        self.outputs = [o.name for o in model.graph.output if o.name.startswith(SET_PREFIX)]
+        terms = interface.columns - len(SENSOR_ERROR_COLUMNS) - len(MODEL_ERROR_COLUMNS)
+        soil = self.calls.get(LIKELIEST, self.calls[FIRST]).output[0]
+        self.soil = {soil: Tensor("work->soil", "float", (terms, 1))}
+        self.parameters = {
+            "memory": f"const {name}_memory *memory", "r": "int r",
+            "estimate": f"{name}_set_estimate *estimate", "work": "WORK *work",
+        }  # fmt: skip
+
+    def function(
+        self,
+        name: str,
+        inputs: Mapping[str, Tensor],
+        outputs: Mapping[str, str],
+        checked: bool = False,
+    ) -> Function:
+        """A function of these inputs and those of a set; see `translate`."""
+        return translate(
+            name, self.nodes, self.known, {**inputs, **self.of_set}, outputs, self.shared,
+            self.parameters, checked,
+        )  # fmt: skip
+
+    def constant(self, kind: str, argument: str) -> NDArray[Any]:
+        """The value of a constant that a composite is given."""
+        from onnx import numpy_helper
+
+        own = self.given[kind][argument]
+        tensor = self.known.get(own)
+        if tensor is not None and tensor.value is not None:
+            return tensor.value
+        node = next(n for n in self.nodes if n.op_type == "Constant" and own in n.output)
+        return numpy_helper.to_array(node.attribute[0].t)
+
+    def values_at_soil(self) -> tuple[list[str], list[str]]:
+        """What columns at a soil need: values of each row, and values of the soil alone."""
+        composites = list(self.calls.values())
+        others = [n for n in self.nodes if n not in composites and self.counted not in n.output]
+        row_values, soil_values = (_following(others, own) for own in (self.of_rows, self.soil))
+        of_soil = [node for node in others if soil_values & {*node.output}]
+        of_rows = {n for node in of_soil for n in node.input if n in row_values - soil_values}
+        of_both = [node for node in of_soil if row_values & {*node.output}]
+        alone = soil_values - row_values - {*self.soil}
+        return sorted(of_rows), sorted({n for node in of_both for n in node.input if n in alone})
+
+
 def set_functions(
     model: Any, interface: Interface, shared: SharedParts, rows: int, name: str
 ) -> SetFunctions:
@@ -81,104 +158,58 @@ def set_functions(
 
     Raises `ModelFileError` for a graph without the composites: one of an earlier version.
     """
-    shapes = input_shapes(model)
-    known = {SET_SWITCH: Tensor.constant(np.ones(1, np.bool_))}
-    nodes = flat_nodes(model.graph, known)
-    found = {node.op_type: node for node in nodes if node.op_type in (SOUND, FIRST, POSTERIOR)}
-    if len(found) < 3:
-        raise ModelFileError(EARLIER)
-    likeliest = next((node for node in nodes if node.op_type == LIKELIEST), None)
-    first, posterior = (_arguments(model, found[kind]) for kind in (FIRST, POSTERIOR))
-    of_rows = {
-        field.name: Tensor(f"(&work->readings[{k}][r])", shapes[field.name][0], (1,))
-        for k, field in enumerate(interface.rows)
-    }
-    of_set = {
-        field.name: Tensor(f"(&memory->context.{field.name})", shapes[field.name][0], (1,))
-        for field in interface.context
-    }
-    if MODEL_ERROR_INPUT in of_set:  # which a check leaves out
-        of_set[MODEL_ERROR_INPUT] = Tensor("work->size", "float", (1,))
-    for given in (*of_rows, *of_set):
-        known.pop(given, None)
-    counted = next(n.output[0] for n in nodes if MEMORY_OUTPUTS[1] in n.output[0])
-    basis = (likeliest or found[FIRST]).output[0]
-    terms = interface.columns - len(SENSOR_ERROR_COLUMNS) - len(MODEL_ERROR_COLUMNS)
-    soil = Tensor("work->soil", "float", (terms, 1))
-    made = partial(
-        translate, nodes=nodes, known=known, shared=shared,
-        parameters={
-            "memory": f"const {name}_memory *memory", "r": "int r",
-            "estimate": f"{name}_set_estimate *estimate", "work": "WORK *work",
-        },
-    )  # fmt: skip
-    # values that follow from the readings of a row, and from the soil as well
-    composites = [node for node in nodes if node.op_type in (SOUND, FIRST, LIKELIEST, POSTERIOR)]
-    others = [node for node in nodes if node not in composites and counted not in node.output]
-    row_values, soil_values = _following(others, of_rows), _following(others, {basis})
-    of_soil = [node for node in others if soil_values & {*node.output}]
-    live = {n for node in of_soil for n in node.input if n in row_values - soil_values}
-    of_both = [node for node in of_soil if row_values & {*node.output}]
-    common = {n for node in of_both for n in node.input if n in soil_values - row_values - {basis}}
-    kept = {value: f"of_rows_{k}" for k, value in enumerate(sorted(live))}
-    of_all = {value: f"of_soil_{k}" for k, value in enumerate(sorted(common))}
-    no_counts = {found[SOUND].output[1]: Tensor.constant(np.zeros(3, np.float32))}
-    row = made(
-        "row_graph", inputs={**of_rows, **of_set, **no_counts},
-        outputs={
-            first["columns"]: "work->of_row", first["used"]: "work->used[r]",
-            ROW_IN_RANGE: "(work->inside + r)", counted: "work->of_counts",
-            **{value: f"work->{member}[r]" for value, member in kept.items()},
-        },
-    )  # fmt: skip
+    graph = _SetGraph(model, interface, shared, name)
+    first, posterior = graph.given[FIRST], graph.given[POSTERIOR]
+    kept, of_all = (
+        {value: f"{member}_{k}" for k, value in enumerate(values)}
+        for member, values in zip(("of_rows", "of_soil"), graph.values_at_soil(), strict=True)
+    )
+    no_counts = {graph.calls[SOUND].output[1]: Tensor.constant(np.zeros(3, np.float32))}
+    places = {
+        first["columns"]: "work->of_row", first["used"]: "work->used[r]",
+        ROW_IN_RANGE: "(work->inside + r)", graph.counted: "work->of_counts",
+    }  # fmt: skip
+    places |= {value: f"work->{member}[r]" for value, member in kept.items()}
+    row = graph.function("row_graph", {**graph.of_rows, **no_counts}, places)
     channels, row_columns = row.outputs[first["columns"]][1]
     if channels != CHANNELS:
         raise ModelFileError(EARLIER)
     if wrong := [value for value in kept if row.outputs[value][0] != "float"]:
         raise ModelFileError(f"value {wrong[0]} of a row is not float32")
     places = {value: f"work->{member}" for value, member in of_all.items()}
-    once = made("once_graph", inputs={basis: soil, **of_set}, outputs=places)
-    rows_kept = {v: Tensor(f"work->{m}[r]", *row.outputs[v]) for v, m in kept.items()}
-    soil_kept = {v: Tensor(places[v], *once.outputs[v]) for v in of_all}
-    at_soil = made(
-        "soil_graph", inputs={basis: soil, **rows_kept, **soil_kept, **of_set},
-        outputs={posterior["columns"]: "work->of_row"},
-    )  # fmt: skip
-    total = {counted: Tensor("work->counted", "float", (3,))}
-    of_composites = {posterior["limit"]: "work->limit", posterior["size"]: "work->size"}
-    if likeliest is not None:
-        of_composites[_arguments(model, likeliest)["std"]] = "work->std"
-        of_composites[first["unknowns"]] = "work->unknowns"
-    whole = made("set_graph", inputs={**of_set, **total}, outputs=of_composites)
-    sizes = _values(known, first, posterior, interface, rows, nodes, likeliest, model)
-    points = sizes["POINTS"]
-    sampled = {"points": (1 + sizes["UNKNOWNS"], points), "weights": (1, points), "misfit": (1,)}
+    once = graph.function("once_graph", graph.soil, places)
+    at_soil = {v: Tensor(f"work->{m}[r]", *row.outputs[v]) for v, m in kept.items()}
+    at_soil |= {v: Tensor(place, *once.outputs[v]) for v, place in places.items()}
+    columns = {posterior["columns"]: "work->of_row"}
+    soil = graph.function("soil_graph", {**graph.soil, **at_soil}, columns)
+    total = {graph.counted: Tensor("work->counted", "float", (3,))}
+    places = {posterior["limit"]: "work->limit", posterior["size"]: "work->size"}
+    if LIKELIEST in graph.given:
+        places[graph.given[LIKELIEST]["std"]] = "work->std"
+        places[first["unknowns"]] = "work->unknowns"
+    whole = graph.function("set_graph", total, places)
+    values = _values(graph, interface, rows)
+    points = values["POINTS"]
+    shapes = {"points": (1 + values["UNKNOWNS"], points), "weights": (1, points), "misfit": (1,)}
     sample = {
         value: Tensor(f"work->{member}", "float", shape)
-        for value, (member, shape) in zip(found[POSTERIOR].output, sampled.items(), strict=False)
+        for value, (member, shape) in zip(
+            graph.calls[POSTERIOR].output, shapes.items(), strict=False
+        )
     }
-    outputs = [o.name for o in model.graph.output if o.name.startswith(SET_PREFIX)]
-    answer = made(
-        "answer_graph", inputs={**of_set, **total, **sample}, checked=True,
-        outputs={output: estimate_place(output.removeprefix(SET_PREFIX)) for output in outputs},
-    )  # fmt: skip
+    places = {output: estimate_place(output.removeprefix(SET_PREFIX)) for output in graph.outputs}
+    answer = graph.function("answer_graph", {**total, **sample}, places, checked=True)
     members: dict[str, tuple[int, ...]] = {
         **{m: (rows, prod(row.outputs[v][1])) for v, m in kept.items()},
         **{m: (prod(once.outputs[v][1]),) for v, m in of_all.items()},
-        **_work_members(sizes, interface.columns, rows),
+        **_work_members(values, interface.columns, rows),
     }
-    return SetFunctions(row, whole, once, at_soil, answer, row_columns, members, sizes)
+    return SetFunctions(row, whole, once, soil, answer, row_columns, members, values)
 
 
 def estimate_place(output: str) -> str:
     """Where an output lies in the struct of an estimate."""
     return f"{'&' if output in SCALARS else ''}estimate->{output}"
-
-
-def _arguments(model: Any, node: Any) -> dict[str, str]:
-    """What a call of a local function is given, by the names in the function."""
-    function = next(f for f in model.functions if f.name == node.op_type)
-    return dict(zip(function.input, node.input, strict=True))
 
 
 def _following(nodes: Sequence[Any], names: Iterable[str]) -> set[str]:
@@ -190,32 +221,16 @@ def _following(nodes: Sequence[Any], names: Iterable[str]) -> set[str]:
     return found
 
 
-def _values(
-    known: Mapping[str, Tensor], first: Mapping[str, str], posterior: Mapping[str, str],
-    interface: Interface, rows: int, nodes: Sequence[Any], likeliest: Any, model: Any,
-) -> dict[str, Any]:  # fmt: skip
+def _values(graph: _SetGraph, interface: Interface, rows: int) -> dict[str, Any]:
     """Sizes, which are macros of C, and constant arrays for the template of the sampler."""
-    constants = {
-        name: node.attribute[0].t for node in nodes if node.op_type == "Constant"
-        for name in node.output
-    }  # fmt: skip
-
-    def value(names: Mapping[str, str], name: str) -> NDArray[Any]:
-        from onnx import numpy_helper
-
-        own = names[name]
-        tensor = known.get(own)
-        found = tensor.value if tensor is not None else numpy_helper.to_array(constants[own])
-        assert found is not None
-        return found
-
-    factors = value(first, "terms")
-    unknowns = len(value(first, "tilts"))
+    of_first, of_posterior = (partial(graph.constant, kind) for kind in (FIRST, POSTERIOR))
+    factors = of_first("terms")
+    unknowns = len(of_first("tilts"))
     powers = (factors == unknowns).sum(axis=1)
     order = np.argsort(powers, kind="stable")
     others = np.where(factors == unknowns, 0, factors)[order]
-    present = value(posterior, "present")
-    zs: Any = value(_arguments(model, likeliest), "powers") if likeliest is not None else []
+    present = of_posterior("present")
+    zs = len(graph.constant(LIKELIEST, "powers")) if LIKELIEST in graph.given else 0
     sizes = {
         "CHANNELS": CHANNELS,
         "MONOMIALS": interface.columns - len(SENSOR_ERROR_COLUMNS) - len(MODEL_ERROR_COLUMNS),
@@ -223,13 +238,14 @@ def _values(
         "POWERS": int(powers.max()) + 1,
         "UNKNOWNS": unknowns,
         "DEGREE": factors.shape[1],
-        "FIRST": value(first, "draws").shape[1],
-        "ADAPTED": value(posterior, "normal").shape[1],
-        "ROUNDS": int(value(posterior, "rounds").flat[0]),
+        "FIRST": of_first("draws").shape[1],
+        "ADAPTED": of_posterior("normal").shape[1],
+        "ROUNDS": int(of_posterior("rounds").flat[0]),
         "SENSORS": len(SENSOR_ERROR_COLUMNS),
-        "LINEAR": len(zs),
+        "MODEL_ERRORS": len(MODEL_ERROR_COLUMNS),
+        "LINEAR": zs,
         "ERRORS": len(present),
-        "SCALES": len(value(posterior, "scales")),
+        "SCALES": len(of_posterior("scales")),
         "TILE": SMALL_TILE if interface.small else TILE,
         "FEW_ROWS": len(order) if interface.small else FEW_ROWS,
     }
@@ -242,19 +258,18 @@ def _values(
         "column_of": order, "power_of": powers[order],
         "power_ends": np.searchsorted(powers[order], range(powers.max() + 1), "right"),
         "factor_rows": -np.sort(-others, axis=1), "present_errors": present,
-        "prior_draws": value(first, "draws"), "prior_t": value(first, "t"),
-        "log_prior": value(first, "log_prior"), "adapted_draws": value(posterior, "normal"),
-        "adapted_t": value(posterior, "t"), "log_density": value(posterior, "log_density"),
-        "error_scales": value(posterior, "scales"), "tilts": value(first, "tilts"),
-        "log_probabilities": value(posterior, "log_probabilities"),
+        "prior_draws": of_first("draws"), "prior_t": of_first("t"),
+        "log_prior": of_first("log_prior"), "adapted_draws": of_posterior("normal"),
+        "adapted_t": of_posterior("t"), "log_density": of_posterior("log_density"),
+        "error_scales": of_posterior("scales"), "tilts": of_first("tilts"),
+        "log_probabilities": of_posterior("log_probabilities"),
     }  # fmt: skip
-    if likeliest is not None:
-        given = _arguments(model, likeliest)
+    if zs:
         named = {"sampled_part": "part", "linear_powers": "powers"}
         named |= {"linear_derivatives": "derivatives"}
-        arrays |= {key: value(given, name) for key, name in named.items()}
+        arrays |= {key: graph.constant(LIKELIEST, name) for key, name in named.items()}
     numbers = {name.lower(): number for name, number in vars(sampler).items() if name.isupper()} | {
-        "targets": int(value(posterior, "targets").flat[0]), "damping": sampler.DAMPING_STD**-2,
+        "targets": int(of_posterior("targets").flat[0]), "damping": sampler.DAMPING_STD**-2,
         "least_jacobian": 1.0 - LARGEST_TANH**2,
     }  # fmt: skip
     return sizes | {"arrays": arrays, "numbers": numbers}

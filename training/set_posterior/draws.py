@@ -39,11 +39,6 @@ class SampleSizes:
     adapted: int
     rounds: int
 
-    @property
-    def all(self) -> int:
-        """Samples of all rounds."""
-        return self.prior + self.rounds * self.adapted
-
 
 #: Up to this many unknowns the smaller sizes apply: posterior means are then off by 0.1 of a
 #: standard deviation (root mean square).

@@ -53,11 +53,10 @@ class ForceCurves:
 
         Wheels that are read one after the other share their working memory.
         """
-        m = len(self.table.slip)
         scale = self.load.take([wheel], 0) * float(self.table.radius[wheel])
         torque = self._read(self.table.torque[self.table.kind[wheel]], wheel)
-        low, high = torque.columns(0, m - 1), torque.columns(1, m)
-        return (low * hot).sum(1, True) * scale, (high * hot).sum(1, True) * scale
+        low, high = at_ends(torque, hot, len(self.table.slip))
+        return low * scale, high * scale
 
     def _read(self, values: Floats, wheel: int) -> Value:
         """A table (l, n, m) at the load and the slips of a wheel, (n, m)."""
@@ -68,6 +67,12 @@ class ForceCurves:
             parts.append((over_load @ flat).reshape(-1, len(self.table.slip)))
         soils, floors = parts  # wheels on a hard floor share its little slip
         return concat([soils @ over_slip, floors], 0)
+
+
+def at_ends(values: Value, hot: Value, m: int) -> tuple[Value, Value]:
+    """Values (n, m) at both ends of the interval that `hot` (n, m - 1) marks, (n, 1) each."""
+    low, high = values.columns(0, m - 1), values.columns(1, m)
+    return (low * hot).sum(1, True), (high * hot).sum(1, True)
 
 
 def slip_of(ratio: Value) -> Value:

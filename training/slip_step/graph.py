@@ -29,7 +29,7 @@ from soilml.slip_filter.filter import (
 )
 from training.onnx_graph.builder import FLOAT, Graph
 from training.onnx_graph.value import Value, absolute, concat, constant, exp, log, sqrt, where
-from training.slip_step.force_curves import RATIO_ENDS, ForceCurves, slip_of
+from training.slip_step.force_curves import RATIO_ENDS, ForceCurves, at_ends, slip_of
 
 #: Places of the distribution function of the speed, in standard deviations about the mean.
 PLACES = np.arange(-4.0, 4.01, 0.125)
@@ -97,8 +97,8 @@ class _Step:
         usable = as_float(raw.reduce("ReduceMin", 0, True) > least_speed)
         middle, before = raw.reduce("ReduceMean", 0, True), recent.take([1], 0)
         change = absolute(middle - before) / (read["elapsed"].clip(TINY) * gravity)
-        uneven = where(before > 0.0, change, 0.0)
-        sound = usable * as_float(uneven <= float(self.errors.pull_std))
+        steady = where(before > 0.0, change, 0.0) <= float(self.errors.pull_std)
+        sound = usable * as_float(steady)
         standing = as_float(absolute(raw).reduce("ReduceMax", 0, True) <= least_speed)
         raw = where(usable > 0.5, raw, float(least_speed) + constant(self.graph, np.ones(self.k)))
         torque = read["torque"] * way
@@ -143,16 +143,14 @@ class _Step:
         concat([no_soil, beyond], 0).reshape(2).named("probability")
         refused = as_float(no_soil > LIKELY)
         answered = sound * (1.0 - refused)
-        flags = [
-            standing,
-            (1.0 - sound) * (1.0 - standing),
-            refused * sound,
-            self._misfits(judged) * answered,
-            as_float(beyond > LIKELY) * answered,
-            as_float(widest > WIDE) * answered,
-            wild * sound,
+        doubts = [
+            self._misfits(judged),
+            as_float(beyond > LIKELY),
+            as_float(widest > WIDE),
         ]
-        concat(flags, 0).reshape(len(FLAGS)).named("flags")
+        flags = [standing, (1.0 - sound) * (1.0 - standing), refused * sound]
+        flags += [doubt * answered for doubt in doubts]
+        concat([*flags, wild * sound], 0).reshape(len(FLAGS)).named("flags")
 
     def _rims(self, apart: Value, rim: Value) -> tuple[Value, Value, Value]:
         """As `SlipFilter._rims`."""
@@ -175,8 +173,7 @@ class _Step:
         hot = concat([second + begin, rest], 1)
         last = np.eye(1, m - 1, m - 2)
         hot = hot + (1.0 - known) * constant(self.graph, last)
-        low = (pull.columns(0, m - 1) * hot).sum(1, True)
-        high = (pull.columns(1, m) * hot).sum(1, True)
+        low, high = at_ends(pull, hot, m)
         rise = (high - low).clip(1e-3 * float(self.filter.weight))
         share = where(known > 0.5, ((needed - low) / rise).clip(0.0, 1.0), 1.0)
         missing = where(known > 0.5, 0.0 * rise, needed - pull.reduce("ReduceMax", 1, True))

@@ -60,7 +60,7 @@ int main(void)
         }
         PREFIX(set_estimate) found;
         const uint32_t before = TIMER[2];
-        const int code = PREFIX(set_update)(&memory, &row, 1, NULL, &found, &work);
+        const int code = PREFIX(set_step)(&memory, &row, 1, NULL, &found, &work);
         const uint32_t ticks = (before - TIMER[2]) & FULL;
         const uint32_t *deepest = stack - WATCHED;
         while (deepest < stack && *deepest == MARK)

@@ -32,7 +32,6 @@ its class (Comin and Saaj 2017, eq. 32). --balance adds how a track stands:
 shares of the load, trim, sinkage of the rear wheel, tension.
 """
 
-_ONCE_RADIANS = 1.6  # Largest slip angle in radians, the unit of the version before
 MOST_BALANCED = 2000  # Most rows of --balance, whose integrals take some 50 kB each
 ARGUMENTS = (
     ("model MODEL.toml", "gear, soil and effects", InputFile),
@@ -58,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
 
     from soilml.cli.option_values import parse_numbers
     from soilml.cli.options import available_effects
-    from soilml.cli.output import tell, write_columns
+    from soilml.cli.output import write_columns
     from soilml.cli.progress import progress_bar
     from soilml.config.case import read_case_of_one_gear
     from soilml.fitting.covariance import ignored_discrepancy
@@ -86,8 +85,6 @@ def run(args: argparse.Namespace) -> int:
         )
     slip, load = (grid.ravel() for grid in np.meshgrid(slips, loads))
     angle = None if args.slip_angle is None else np.deg2rad(args.slip_angle)
-    if angle is not None and 0.0 < abs(args.slip_angle) <= _ONCE_RADIANS:
-        tell(f"! --slip-angle is in degrees now: {args.slip_angle:g} degrees")
     known = {"speed": args.speed, "pass_number": args.pass_, "slip_angle": angle}
     options: dict[str, Any] = {**known, "run": args.label, "with_std": args.std}
     options["with_efficiency"] = args.efficiency
@@ -109,10 +106,7 @@ def run(args: argparse.Namespace) -> int:
     for line in ignored_discrepancy(case, "simulate", "the rows have no error of the model"):
         print(line, file=sys.stderr)
     if failed:
-        print(
-            f"{failed} of {slip.size} rows have no equilibrium: see the column status",
-            file=sys.stderr,
-        )
+        print(f"{failed} of {slip.size} rows have no equilibrium: see status", file=sys.stderr)
     return 0
 
 

@@ -19,10 +19,8 @@ from soilml.log_import.channels.resampling import (
     on_grid,
     sampling_interval,
     unwrapped,
-    without_spikes,
 )
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.channels.wheel_quantities import slope_of
 from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.windows.mean_errors import mean_error
@@ -32,8 +30,6 @@ SMOOTH = 0.5  # Span of the derivative of places and angles, s
 #: Share of the usual rotation speed below which a wheel stands still; shortest rest, and what is
 #: left out before the start, s.
 _STANDS, _SHORTEST_REST, _BEFORE_START = 0.05, 0.4, 0.2
-#: Channels of a wheel-leg in which single wild samples are left out.
-_DESPIKED = ("torque", "motor_current", "load", "drawbar_pull", "sinkage", "clearance", "vibration")
 #: Roles that are places, and the role of their rate.
 _PLACES = {"wheel_angle": "wheel_speed", "position": "ground_speed"}
 _EFFORT = 0.1  # Share of the usual torque or current that is more than noise and offset
@@ -68,6 +64,24 @@ class Inputs:
         """The first speed that is known (n,): rotation, rim, travel."""
         known = ("wheel_speed", "rim_speed", "ground_speed")
         return next((self.values[role] for role in known if role in self.values), None)
+
+    @property
+    def motion(self) -> Floats | None:
+        """What is zero where the wheel rests (n,): the speed, else torque or current less its zero.
+
+        The zero is that of a log that begins at rest.
+        """
+        if self.speed is not None and np.isfinite(self.speed).any():
+            return self.speed
+        effort = self.values.get("torque", self.values.get("motor_current"))
+        first = max(3, round(_SHORTEST_REST / self.step))
+        of_slip = "slip" in self.values or "slip" in self.constants
+        if effort is None or not of_slip or not np.isfinite(effort[:first]).any():
+            return None
+        zero = float(np.nanmedian(effort[:first]))
+        usual = float(np.nanpercentile(np.abs(effort), 90))
+        moved = effort - (zero if abs(zero) < _EFFORT * usual else 0.0)
+        return np.where(np.abs(moved) > _EFFORT * usual, moved, 0.0)
 
     def within(self, start: float, stop: float) -> NDArray[np.bool_]:
         """Samples (n,) of a stretch."""
@@ -106,13 +120,6 @@ def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
         channel = wheel.channels[role]
         if channel.unwrap:
             several = [(t, unwrapped(v, channel.unwrap)) for t, v in several]
-        if wheel.leg is not None and role in _DESPIKED:
-            # single wild samples, which the largest acceleration of a stance would be
-            found = [(times, *without_spikes(values)) for times, values in several]
-            if count := sum(wild for *_, wild in found):
-                text = f"[{role}]: {count} single wild samples are left out"
-                inputs.notes.append(Remark("spikes", text, (role,), severity="note"))
-            several = [(times, values) for times, values, _ in found]
         rate = _PLACES.get(role)
         sampled = [on_grid(grid, t, v, continuous=rate is not None) for t, v in several]
         if rate is None:
@@ -131,8 +138,6 @@ def combined(channel: ChannelMap, columns: list[Floats]) -> Floats:
 
     Cells that carry the wheel together add up, sensors of one sinkage are averaged.
     """
-    if channel.role == "slope":
-        return channel.scale * slope_of(columns)
     total = channel.scale * sum(columns[1:], start=columns[0])
     if channel.role == "slip":
         total = our_slip(total, channel.definition)
@@ -183,10 +188,9 @@ def channel_constant(run: Run, channel: ChannelMap) -> float:
 
 def resting(inputs: Inputs) -> slice | None:
     """The stretch before the wheel starts, without its end; None where there is none."""
-    speed = inputs.speed if inputs.speed is not None else _effort(inputs)
-    if speed is None or not np.isfinite(speed).any():
+    if inputs.motion is None:
         return None
-    size = np.abs(speed)
+    size = np.abs(inputs.motion)
     moves = np.nan_to_num(size) > max(_STANDS * float(np.nanpercentile(size, 90)), 1e-9)
     # a single noisy sample is no start
     width = max(1, round(0.1 / inputs.step))
@@ -203,19 +207,6 @@ def moving(inputs: Inputs) -> NDArray[np.bool_]:
         return np.ones(inputs.time.size, dtype=bool)
     size: Floats = np.abs(np.nan_to_num(inputs.speed))
     return np.asarray(size > 0.3 * np.percentile(size, 90))
-
-
-def _effort(inputs: Inputs) -> Floats | None:
-    """Torque or current (n,) less its zero, in a log of slip without speeds that begins at rest."""
-    effort = inputs.values.get("torque", inputs.values.get("motor_current"))
-    first = max(3, round(_SHORTEST_REST / inputs.step))
-    if effort is None or "slip" not in inputs.values or not np.isfinite(effort[:first]).any():
-        return None
-    zero = float(np.nanmedian(effort[:first]))
-    usual = float(np.nanpercentile(np.abs(effort), 90))
-    if abs(zero) >= _EFFORT * usual:
-        return None  # a zero that is far off, or a wheel that drives from the beginning
-    return np.where(np.abs(effort - zero) > _EFFORT * usual, effort - zero, 0.0)
 
 
 def _tare(inputs: Inputs, wheel: WheelMap) -> None:

@@ -11,10 +11,6 @@ MOST_POINTS, SHORTEST_STEP = 20_000, 0.002  # Most points of a grid, and its sho
 #: A gap is bridged up to this many sampling intervals, long intervals (the 90th percentile), or
 #: seconds.
 _BRIDGED_SAMPLES, _BRIDGED_LONG, _BRIDGED_SECONDS = 3.5, 2.0, 0.05
-#: How many times the usual difference from the median of its neighbours a wild sample has, and how
-#: many neighbours on either side it is compared with.
-_SPIKE, _AROUND = 8.0, 5
-_MAD = 1.4826  # Standard deviation of normal values over their median absolute deviation
 
 
 def sampling_interval(times: Floats, values: Floats) -> float:
@@ -89,23 +85,3 @@ def derivative(grid: Floats, values: Floats, span: float) -> Floats:
         spread = tt - t * t / count
         slope = (ty - t * y / count) / spread
     return np.where((count >= half + 1) & (spread > 0.0), slope, np.nan)
-
-
-def without_spikes(values: Floats) -> tuple[Floats, int]:
-    """Samples (n,) with wild ones, single or two in a row, as NaN, and how many they were.
-
-    A sample is wild where it is off the median of five by much more than samples usually are, and
-    by more than the range of those two to five places away: a fast oscillation has no wild samples.
-    """
-    known = np.flatnonzero(np.isfinite(values))
-    if known.size < 2 * _AROUND + 1:
-        return values, 0
-    own = np.pad(values[known], _AROUND, mode="reflect")
-    parts = np.lib.stride_tricks.sliding_window_view(own, 2 * _AROUND + 1)
-    off = np.abs(values[known] - np.median(parts[:, _AROUND - 2 : _AROUND + 3], axis=1))
-    ring = np.delete(parts, [_AROUND - 1, _AROUND, _AROUND + 1], axis=1)
-    usual = _MAD * float(np.median(off[off > 0.0])) if np.any(off > 0.0) else np.inf
-    wild = known[(off > _SPIKE * usual) & (off > np.ptp(ring, axis=1))]
-    found = values.copy()
-    found[wild] = np.nan
-    return found, int(wild.size)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.log_import.mapping.channel_map import UNITS
+from soilml.log_import.mapping.channel_map import UNITS, ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.units import factor
 
@@ -64,10 +64,14 @@ class RowsToCheck:
         """The numbers of a quantity; empty where it is absent."""
         return np.asarray(self.of(name)[np.isfinite(self.of(name))])
 
-    def channel(self, *roles: str) -> str:
+    def role(self, *roles: str) -> str:
         """The first of these channels that the map has; "" for none, and for a table."""
         channels = self.wheel.channels if self.wheel is not None else {}
         return next((role for role in roles if role in channels), "")
+
+    def channel(self, role: str) -> ChannelMap | None:
+        """A channel of the map; None where it has none."""
+        return self.wheel.channels.get(role) if self.wheel is not None else None
 
     def write(self, line: str, role: str) -> str:
         """What to change in the map; nothing for a table."""
@@ -78,10 +82,23 @@ class RowsToCheck:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.of("torque") / self.of("load"))
 
-    def read_as(self, role: str) -> tuple[str, dict[str, float]]:
-        """The unit in which a channel is read, and those that may be meant instead."""
-        channel = self.wheel.channels.get(role) if self.wheel is not None else None
-        if channel is not None and channel.has_scale:
-            return "", {}
-        read = (channel.unit if channel is not None else "") or UNITS[role]
-        return read, other_units(role, read)
+    def units_that_give(
+        self, value: float, within: tuple[float, float], **powers: int
+    ) -> list[str]:
+        """Each mistaken unit whose correction brings a value between two bounds.
+
+        powers: The power with which the value grows with each channel.
+        """
+        found = []
+        for role, power in powers.items():
+            channel = self.channel(role)
+            if channel is not None and channel.has_scale:
+                continue  # a calibration, and no unit
+            read = (channel.unit if channel is not None else "") or UNITS[role]
+            for meant, size in other_units(role, read).items():
+                if within[0] < value * size**power < within[1]:
+                    # of a scale, people say kg
+                    shown = "kg" if meant == "kgf" else meant
+                    what = role.replace("_", " ")
+                    found.append(f"the {what} is in {shown} and was read as {read}")
+        return found

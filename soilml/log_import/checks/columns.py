@@ -14,14 +14,15 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.config.measurement_noise import Noise
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.mapping.channel_map import UNITS
-from soilml.log_import.mapping.log_map import LogMap, WheelMap
+from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.units import dimension, factor, is_raw_signal
 from soilml.remarks import Remark
 
 #: Kinds that a channel may have beside its own, where `unit` or a calibration brings it there.
-_ALSO = {"load": {"kg"}, "drawbar_pull": {"kg"}, "slope": {"m/s^2", "1"}}
+_ALSO = {"load": {"kg"}, "drawbar_pull": {"kg"}}
 _SAME_UNIT = 1e-3  # Relative difference of two units of the same size
 #: Shared error of a torque from a current: of torque constant and efficiency, as data sheets state
 #: them; of a load from a mass, as a rover is weighed.
@@ -33,44 +34,26 @@ _SAME = 0.003  # Scatter about a straight line, over all scatter, below which on
 _FEWEST = 8  # Fewest samples that tell
 
 
-def unit_hints(log_map: LogMap, wheel: WheelMap, run: Run) -> list[Remark]:
-    """Refusals of columns that the log states to be of another kind: a moment as a sinkage.
+def unit_remarks(wheel: WheelMap, run: Run) -> Iterator[Remark]:
+    """Columns that the log states to be of another kind, as a moment for a sinkage, which is
+    wrong (`unit-of-another-kind`); and channels that the map reads in another unit.
 
     A channel with a scale of its own is not judged: somebody knows better than the header.
     """
-    return [
-        Remark(
-            "unit-of-another-kind",
-            f"{log_map.source}: the log states {unit} for {column!r}, which is no unit of [{role}]",
-            (role,),
-        )
-        for role, column, unit in _stated(wheel, run)
-        if dimension(unit) not in {UNITS[role], "1", *_ALSO.get(role, ())}
-        and not is_raw_signal(unit)
-    ]
-
-
-def differing_units(wheel: WheelMap, run: Run) -> list[Remark]:
-    """Remarks on channels that the map reads in another unit than the log states."""
-    found = []
-    for role, column, unit in _stated(wheel, run):
-        read, ours = wheel.channels[role].unit, UNITS[role]
-        comparable = read and dimension(unit) == ours == dimension(read)
-        if comparable and abs(factor(read, ours) / factor(unit, ours) - 1.0) > _SAME_UNIT:
-            text = f"[{role}] is read in {read}; the log states {unit} for {column!r}"
-            found.append(Remark("unit-differs", text, (role,)))
-    return found
-
-
-def _stated(wheel: WheelMap, run: Run) -> Iterator[tuple[str, str, str]]:
-    """Role and column of channels with the unit that the log states, where it does."""
     for role, channel in wheel.channels.items():
         for address in channel.columns if not channel.has_scale else ():
-            name = address.rpartition(":")[2]
+            name, ours = address.rpartition(":")[2], UNITS[role]
             units = (r.units.get(address) or r.units.get(name, "") for r in run.recordings)
             unit = next((unit for unit in units if unit and dimension(unit)), "")
-            if unit:
-                yield role, address, unit
+            kind, read = dimension(unit) if unit else "1", channel.unit
+            if kind not in {ours, "1", *_ALSO.get(role, ())} and not is_raw_signal(unit):
+                text = f"the log states {unit} for {address!r}, which is no unit of [{role}]"
+                yield Remark("unit-of-another-kind", text, (role,))
+            elif not unit or not read or not kind == ours == dimension(read):
+                continue
+            elif abs(factor(read, ours) / factor(unit, ours) - 1.0) > _SAME_UNIT:
+                text = f"[{role}] is read in {read}; the log states {unit} for {address!r}"
+                yield Remark("unit-differs", text, (role,))
 
 
 def with_shared_errors(wheel: WheelMap, runs: Sequence[Run]) -> tuple[WheelMap, list[Remark]]:
@@ -78,49 +61,45 @@ def with_shared_errors(wheel: WheelMap, runs: Sequence[Run]) -> tuple[WheelMap, 
 
     A larger error that the map states is kept; a load with any is left as it is.
     """
-    channels, remarks = dict(wheel.channels), []
-
-    def computed(role: str, share: float, text: str) -> None:
-        own = channels[role]
-        channels[role] = replace(own, shared=replace(own.shared, share=share))
-        text = f"[{role}] {text}, so that all rows share its error; it counts as {share:.0%}, write"
-        text += f" bias in [{role}] where it is larger"
-        remarks.append(Remark(f"computed-{role}", text, (role,)))
-
+    channels, computed = dict(wheel.channels), {}
     torque, load = channels.get("torque"), channels.get("load")
     exact = torque is not None and len(torque.columns) == 1 and torque.shared.share < _TORQUE
     if torque and exact and (source := _current_of(runs[0], torque.columns[0])):
-        text = f"is a constant times the current {source!r}: it was computed and not measured"
-        computed("torque", _TORQUE, text)
-    exact = load is not None and not (load.shared.share or load.shared.constant)
-    if load and exact and load.columns and all(_is_computed(wheel, run) for run in runs):
-        text = "is a constant or follows from the slope: it was computed from a mass and not "
-        computed("load", _LOAD, f"{text}measured")
+        computed["torque"] = _TORQUE, f"is a constant times the current {source!r}: it was"
+    exact = load is not None and bool(load.columns) and load.shared == Noise()
+    if exact and all(_is_of_a_mass(wheel, run) for run in runs):
+        computed["load"] = _LOAD, "is a constant or follows from the slope: from a mass it was"
+    remarks = []
+    for role, (share, text) in computed.items():
+        channels[role] = replace(channels[role], shared=replace(channels[role].shared, share=share))
+        text = (
+            f"[{role}] {text} computed and not measured, so that all rows share its error; it "
+            f"counts as {share:.0%}, write bias in [{role}] where it is larger"
+        )
+        remarks.append(Remark(f"computed-{role}", text, (role,)))
     return replace(wheel, channels=channels), remarks
 
 
 def _current_of(run: Run, address: str) -> str:
     """The current of which a column is a constant multiple; "" for none."""
     name, (_, values) = address.rpartition(":")[2], run.find(address)
-    for recording in run.recordings:
-        if recording.columns.get(name) is not values:
-            continue
+    for recording in (r for r in run.recordings if r.columns.get(name) is values):
         for other, current in recording.columns.items():
             kind = dimension(unit) if (unit := recording.units.get(other, "")) else None
-            named = bool(_CURRENT.search(other.lower())) and kind in (None, "A")
+            named = bool(_CURRENT.search(other.lower())) and kind is None
             if other != name and (kind == "A" or named) and _follows(values, current):
                 return other
     return ""
 
 
-def _is_computed(wheel: WheelMap, run: Run) -> bool:
+def _is_of_a_mass(wheel: WheelMap, run: Run) -> bool:
     """Whether the load is one number, or one number times the cosine of the slope."""
     load, slope = wheel.channels["load"], wheel.channels.get("slope")
     samples = run.find(load.columns[0])[1]
     known = samples[np.isfinite(samples)]
     if len(load.columns) > 1 or known.size < _FEWEST or not known[0]:
         return False
-    if np.ptp(known) == 0.0 or slope is None or len(slope.columns) != 1:
+    if np.ptp(known) == 0.0 or slope is None or not slope.columns:
         return bool(np.ptp(known) == 0.0)
     angle = run.find(slope.columns[0])[1]
     return angle.size == samples.size and _follows(samples, np.cos(slope.scale * angle))

@@ -7,12 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from soilml.log_import.channels.inputs import Inputs, moving
+from soilml.log_import.mapping.channel_map import UNITS
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.rows import WindowRow
 from soilml.remarks import Remark
 
-#: Sensors that respond when a wheel drives.
+#: Sensors that respond when a wheel drives, and those that read zero before it starts.
 _RESPONDING = ("torque", "motor_current", "load", "drawbar_pull", "sinkage")
+_WITH_A_ZERO = ("torque", "drawbar_pull", "motor_current", "sinkage")
 _DEAD_LEVEL = 0.05  # A sensor is dead below this share of its usual level in the other runs
 _SUNK = 0.5  # Share of the radius to which a wheel sinks in at rest
 #: A reading at rest counts as an offset above this share of the reading while driving.
@@ -22,10 +24,9 @@ _OFFSET = 0.05
 _FEWEST_CLIPPED, _CLIPPED, _OFTEN = 20, 0.02, 5
 
 
-def dead_sensors(runs: list[Inputs]) -> list[dict[str, str]]:
+def dead_sensors(runs: Sequence[Inputs]) -> list[dict[str, str]]:
     """For each run of a wheel, the roles whose sensor is dead, with the reason."""
-    roles = dict.fromkeys(role for inputs in runs for role in inputs.values)
-    levels = {role: [_level(inputs, role) for inputs in runs] for role in roles}
+    levels = [{role: _level(inputs, role) for role in inputs.values} for inputs in runs]
     # a load that is a constant above zero in all runs is a weight that the log states
     loads = [own[np.isfinite(own)] for i in runs if (own := i.values.get("load")) is not None]
     stated = all(own.size > 0 and np.ptp(own) == 0.0 and own[0] > 0.0 for own in loads)
@@ -34,7 +35,7 @@ def dead_sensors(runs: list[Inputs]) -> list[dict[str, str]]:
         dead = {}
         for role, values in inputs.values.items():
             known = values[np.isfinite(values)]
-            others = [level for k, level in enumerate(levels[role]) if k != i]
+            others = [own[role] for k, own in enumerate(levels) if k != i and role in own]
             usual = float(np.nanmedian(others)) if len(others) >= 2 else float("nan")
             if known.size == 0:
                 dead[role] = "it has no samples"
@@ -42,8 +43,8 @@ def dead_sensors(runs: list[Inputs]) -> list[dict[str, str]]:
                 continue
             elif np.ptp(known) == 0.0 and role in (*_RESPONDING, "wheel_speed"):
                 dead[role] = f"it reads {known[0]:.3g} throughout"
-            elif role in _RESPONDING and levels[role][i] < _DEAD_LEVEL * usual:
-                level = f"{levels[role][i]:.2g}"
+            elif role in _RESPONDING and levels[i][role] < _DEAD_LEVEL * usual:
+                level = f"{levels[i][role]:.2g}"
                 dead[role] = f"it reads {level} while driving, {usual:.2g} in the other runs"
         found.append(dead)
     return found
@@ -51,13 +52,13 @@ def dead_sensors(runs: list[Inputs]) -> list[dict[str, str]]:
 
 def _level(inputs: Inputs, role: str) -> float:
     """Usual size of a channel while the wheel drives, beside its reading at rest where known."""
-    values = inputs.values.get(role)
-    if values is None or not np.isfinite(values).any():
+    values = inputs.values[role]
+    if not np.isfinite(values).any():
         return float("nan")
     driving = values[moving(inputs)]
     middle = np.nanmedian(driving if np.isfinite(driving).any() else values)
     rest = inputs.rest.get(role, (0.0, 0.0))[0] if role != "load" else 0.0
-    return float(np.abs(middle - (rest if np.isfinite(rest) else 0.0)))
+    return float(np.abs(middle - np.nan_to_num(rest)))
 
 
 def drop_clipped(inputs: Inputs, rows: Sequence[WindowRow]) -> list[Remark]:
@@ -89,47 +90,32 @@ def drop_clipped(inputs: Inputs, rows: Sequence[WindowRow]) -> list[Remark]:
     return found
 
 
-def untared_sensors(wheel: WheelMap, runs: list[Inputs]) -> list[Remark]:
-    """Sensors that read something at rest, where they should read zero, and are not tared.
+def offset_at_rest(inputs: Inputs, role: str) -> float:
+    """What a sensor reads before the wheel starts, where that is more than noise and worth a tare.
 
-    What a load sensor reads too much cannot be seen while the wheel stands in the soil: a load that
-    is not tared is told beside a pull of the same kind of sensor with a large offset.
+    0 where it is not, and where the wheel never rests.
     """
+    mean, error = inputs.rest.get(role, (0.0, 0.0))
+    if role not in inputs.values or not abs(mean) > 5.0 * np.nan_to_num(error):
+        return 0.0
+    return mean if abs(mean) > _OFFSET * _level(inputs, role) else 0.0
+
+
+def untared_sensors(wheel: WheelMap, runs: Sequence[Inputs]) -> list[Remark]:
+    """Sensors that read something at rest, where they should read zero, and are not tared."""
     found = []
     most = _SUNK * (wheel.radius.value if wheel.radius else 0.1)
-    for role, unit in (("torque", "N m"), ("drawbar_pull", "N"), ("motor_current", "A"),
-                       ("sinkage", "m")):  # fmt: skip
+    for role in _WITH_A_ZERO:
         channel = wheel.channels.get(role)
-        if channel is None or channel.tare is not None:
-            continue
-        offsets: list[float] = []
-        shares: list[float] = []
-        for inputs in runs:
-            mean, error = inputs.rest.get(role, (float("nan"), 0.0))
-            sunk = role == "sinkage" and 0.0 < mean < most  # a wheel at rest has sunk in
-            if role in inputs.values and not sunk and abs(mean) > 5.0 * np.nan_to_num(error):
-                level = _level(inputs, role)
-                offsets.append(mean)
-                shares.append(abs(mean) / level if level else np.inf)
-        if offsets and float(np.median(shares)) > _OFFSET:
+        own = runs if channel is not None and channel.tare is None else ()
+        offsets = [offset for inputs in own if (offset := offset_at_rest(inputs, role))]
+        if role == "sinkage":  # a wheel at rest has sunk in
+            offsets = [offset for offset in offsets if not 0.0 < offset < most]
+        if len(offsets) > len(runs) / 2:
             text = (
-                f"[{role}] reads {float(np.median(offsets)):.3g} {unit} before the wheel starts "
-                f"({len(offsets)} of {len(runs)} runs), {float(np.median(shares)):.0%} of its "
-                "reading while driving: add tare = 'rest' where it should read zero there"
+                f"[{role}] reads {float(np.median(offsets)):.3g} {UNITS[role]} before the wheel "
+                f"starts ({len(offsets)} of {len(runs)} runs): add tare = 'rest' where it should "
+                "read zero there"
             )
             found.append(Remark("not-tared", text, (role,)))
-    load, pull = wheel.channels.get("load"), wheel.channels.get("drawbar_pull")
-    if load and pull and load.columns and load.tare is None and pull.tare is not None:
-        tared = [(abs(i.tare["drawbar_pull"]), _level(i, "load")) for i in runs
-                 if "drawbar_pull" in i.tare]  # fmt: skip
-        share = float(np.median([zero / level for zero, level in tared if level > 0.0] or [0.0]))
-        if share >= _OFFSET and load.bias.constant == 0.0:
-            offset = float(np.median([zero for zero, _ in tared]))
-            text = (
-                f"[drawbar_pull] read {offset:.3g} N before the wheel started, {share:.0%} of the "
-                "load: if one sensor measures both, the load may be wrong by as much, which no log "
-                "shows; tare it with the wheel lifted, give [load] value = the weight, or write "
-                f"bias = '1 % + {offset:.2g}' in [load]"
-            )
-            found.append(Remark("load-not-tared", text, ("load", "drawbar_pull")))
     return found

@@ -8,45 +8,40 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.guesses.columns import CALIBRATED, Candidate, name_scores, says, words_of
+from soilml.log_import.guesses.assignment import Assignment
+from soilml.log_import.guesses.columns import Candidate
 from soilml.log_import.guesses.constants import Stated, stated_radius
-from soilml.log_import.guesses.draft import Draft, far_sinkage, inputs_of, lifted, signs, tares
-from soilml.log_import.guesses.evidence import BY_NAME, LEAST_PERCENT, MOST_FRACTION
-from soilml.log_import.guesses.roles import Assignment
-from soilml.log_import.mapping.channel_map import GEARED, ROLES
+from soilml.log_import.guesses.draft import (
+    BY_NAME,
+    Draft,
+    inputs_of,
+    put_signs,
+    put_tares,
+    put_zero_of_sinkage,
+)
+from soilml.log_import.guesses.role_words import (
+    LEAST_PERCENT,
+    MOST_FRACTION,
+    USUAL,
+    name_scores,
+    says,
+    words_of,
+)
+from soilml.log_import.mapping.channel_map import GEARED, ROLES, SLIP_DEFINITIONS
 from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import dimension, is_raw_signal
 
-#: Radius of the wheels of rovers and rigs, m: the usual one, and its range.
-_USUAL_RADIUS, _RADII = 0.12, (0.02, 0.6)
 #: Masses that a scale shows, as forces; any other is taken for kg.
 _AS_FORCE = {"g": "gf", "gram": "gf", "grams": "gf", "lb": "lbf", "pound": "lbf", "pounds": "lbf"}
 _FAR_IN_M = 4.0  # A height of so many m is rather one in mm
 #: Words that say that a column counts the pulses of an encoder.
 _COUNTS = {"count", "counts", "tick", "ticks", "enc", "encoder", "qc", "pulses"}
-#: Units by the size of the values, where none is stated: the least size, and the unit.
-_BY_SIZE: dict[str, tuple[tuple[float, str], ...]] = {
-    "ground_speed": ((8.0, "mm/s"), (3.0, "cm/s"), (0.0, "m/s")),
-    "rim_speed": ((8.0, "mm/s"), (3.0, "cm/s"), (0.0, "m/s")),
-    "position": ((25.0, "mm"), (0.0, "m")),
-    "sinkage": ((1.0, "mm"), (0.0, "m")),
-    "torque": ((300.0, "mN m"), (0.0, "N m")),
-    "motor_current": ((60.0, "mA"), (0.0, "A")),
-    "slope": ((1.2, "deg"), (0.0, "rad")),
-    "slip": ((LEAST_PERCENT, "%"), (0.0, "1")),
-    "load": ((0.0, "N"),),
-    "drawbar_pull": ((0.0, "N"),),
-    "wheel_speed": ((0.0, "rad/s"),),
-}
 _CELLS = "CHANGE: cells that {} are added; leave out others"
 #: What several columns of a channel are.
 _SEVERAL = {
     "load": Marked(_CELLS.format("carry the wheel together")),
     "drawbar_pull": Marked(_CELLS.format("pull together")),
     "sinkage": "the mean of them",
-    "slope": Marked(
-        "CHANGE: accelerations forward, to the left and up; or a quaternion x, y, z, w"
-    ),
 }
 #: Words of columns that are errors of others, and those that may stand beside them.
 _ERRORS = {*words_of(
@@ -59,67 +54,43 @@ _BESIDE = {*words_of("of the type standard estandar estándar mean avg average r
 _OF_TYRES = {"kappa", "long", "longitudinal"}
 
 
-def guess_unit(role: str, column: Candidate, moving: float) -> tuple[str, str]:
-    """The unit of a column, and why: "" where the log states it.
+def draft_channels(
+    chosen: dict[str, Candidate],
+    run: Run,
+    steady: bool,
+    stated: Stated,
+    parts: Mapping[str, Sequence[Candidate]],
+) -> dict[str, Draft]:
+    """Tables of the channels of one wheel, with units, signs and tares as the samples show them.
 
-    `moving` is the 90th percentile of the values without sign.
+    `parts` are the further columns of a role: y and z, where the chosen place is x.
     """
-    if column.unit and column.kind == "kg":
-        force = _AS_FORCE.get(column.unit.lower(), "kgf")
-        return force, f"the log says {column.unit}; as a force that is {force}"
-    if column.unit and column.kind is not None:
-        return column.unit, ""
-    if role in ("wheel_angle", "wheel_speed") and says(column.name, _COUNTS):
-        return "count" if role == "wheel_angle" else "count/s", BY_NAME
-    if role == "wheel_speed" and says(column.name, ("rpm",)):
-        return "rpm", BY_NAME
-    if role == "wheel_angle":
-        range_ = column.about.wraps_at
-        if not range_:
-            return ("deg", "its values are large") if moving > 60 else ("rad", "they are small")
-        unit = {360.0: "deg", 2.0 * math.pi: "rad"}.get(range_, "count")
-        return unit, f"it starts again at {range_:g}"
-    units = _BY_SIZE[role]
-    why = "not stated; by the size of the values" if len(units) > 1 else "not stated"
-    return next(unit for least, unit in units if moving >= least), why
+    drafts = {r: _draft(r, column, run, stated, parts.get(r, ())) for r, column in chosen.items()}
+    if (inputs := inputs_of(drafts, run, steady)) is not None:
+        put_signs(drafts, inputs)
+        put_tares(drafts, inputs)
+        put_zero_of_sinkage(drafts, inputs, stated_radius(stated))
+    return drafts
 
 
-def guess_rotation_unit(rotation: float, travel: float, radius: float) -> tuple[str, str]:
-    """Unit of a rotation rate of this size beside a travel speed (m/s), and why.
-
-    Each unit implies a radius at which nothing slips. That of the map, or a usual one, decides.
-    """
-    if not (rotation > 0.0 and travel > 0.0):
-        return "rad/s", "not stated"
-    options = {"rad/s": 1.0, "rpm": math.pi / 30.0, "deg/s": math.pi / 180.0}
-    wanted = radius if radius > 0.0 else _USUAL_RADIUS
-    implied = {unit: travel / (rotation * factor) for unit, factor in options.items()}
-    unit = min(implied, key=lambda u: abs(math.log(implied[u] / (0.8 * wanted))))
-    if not _RADII[0] < implied[unit] < _RADII[1]:
-        return "rad/s", "not stated; no unit fits the travel, so that a gearbox may lie between"
-    return unit, f"not stated; it would fit a radius of {implied[unit]:.2g} m or more"
-
-
-def draft_of(
+def _draft(
     role: str, column: Candidate, run: Run, stated: Stated, more: Sequence[Candidate]
 ) -> Draft:
     """The table of a channel; `more` are its other columns: y and z of a place, further cells."""
-    draft = Draft(column=column)
+    draft = Draft(column=column, role=role)
     all_ = [c.address for c in (column, *more)]
     draft.put("column", all_ if more else all_[0], _SEVERAL.get(role, "") if more else "")
     columns = [values[np.isfinite(values)] for values in (run.find(c)[1] for c in all_)]
-    moving = float(np.percentile(np.abs(columns[0]), 90)) if columns[0].size else 0.0
+    size = float(np.percentile(np.abs(columns[0]), 90)) if columns[0].size else 0.0
     if role in ("position", "wheel_angle", "sinkage") and columns[0].size:
-        moving = max(float(np.ptp(values)) for values in columns if values.size)
+        size = max(float(np.ptp(values)) for values in columns if values.size)
         if role == "sinkage":  # no wheel sinks in by metres, however little that changes
-            moving = max(moving, float(np.median(np.abs(columns[0]))) / _FAR_IN_M)
-    if role == "slope" and more:
-        return draft  # an angle, whatever the unit of accelerations
-    unit, why = guess_unit(role, column, moving)
+            size = max(size, float(np.median(np.abs(columns[0]))) / _FAR_IN_M)
+    unit, why = _unit(role, column, size)
     kind = dimension(unit)
     if role == "position" and kind == "count":
         draft.put("scale", "1 mm", Marked(f"CHANGE: travel for one count ({unit})"))
-    elif is_raw_signal(unit) and role in CALIBRATED:
+    elif is_raw_signal(unit) and USUAL[role].raw:
         why = f"CHANGE: what 1 {unit} is, from the calibration of the sensor"
         draft.put("scale", f"1 {ROLES[role][0]}", Marked(why))
     elif kind == "1" and role in ("torque", "motor_current"):
@@ -134,17 +105,17 @@ def draft_of(
     if role == "slope" and column.address.endswith("orientation.pitch"):
         why = "of a quaternion (REP 103): there the nose is down where it is positive"
         draft.put("reverse", True, why)
-    if role == "slip" and MOST_FRACTION < moving < LEAST_PERCENT and column.kind is None:
+    if role == "slip" and MOST_FRACTION < size < LEAST_PERCENT and column.kind is None:
         why = Marked(
-            f"CHANGE: it goes to {moving:.2g}, which 1 - v/(r omega) cannot be; where it is in per "
-            "cent, write unit = '%' and remove this line"
+            f"CHANGE: it goes to {size:.2g}, which {SLIP_DEFINITIONS[0]} cannot be; where it is in "
+            "per cent, write unit = '%' and remove this line"
         )
-        draft.put("definition", "(r omega - v)/v", why)
+        draft.put("definition", SLIP_DEFINITIONS[2], why)
     elif role == "slip" and says(column.name, _OF_TYRES):
         why = "as of tyres, and of Chrono's rigs; remove this line where it is 1 - v/(r omega)"
-        draft.put("definition", "(r omega - v)/v", why)
-    if role == "wheel_angle" and column.about.wraps_at:
-        draft.put("wraps_at", column.about.wraps_at, "it starts again there")
+        draft.put("definition", SLIP_DEFINITIONS[2], why)
+    if role == "wheel_angle" and column.wraps_at:
+        draft.put("wraps_at", column.wraps_at, "it starts again there")
     if role in GEARED and (role != "torque" or says(column.name, ("motor", "mot"))):
         _put_gear_ratio(draft, role, column, stated.get("gear_ratio"))
     if role == "motor_current":
@@ -156,6 +127,31 @@ def draft_of(
         draft.put("efficiency", f"{said} +- 0.05", why)
         draft.put("idle_current", "0 A +- 0.02 A", "what the lifted wheel takes at this speed")
     return draft
+
+
+def _unit(role: str, column: Candidate, size: float) -> tuple[str, str]:
+    """The unit of a column, and why: "" where the log states it.
+
+    `size` is the 90th percentile of the values without sign, of places their range.
+    """
+    if column.unit and column.kind == "kg":
+        force = _AS_FORCE.get(column.unit.lower(), "kgf")
+        return force, f"the log says {column.unit}; as a force that is {force}"
+    if column.unit and column.kind is not None:
+        return column.unit, ""
+    if role in ("wheel_angle", "wheel_speed") and says(column.name, _COUNTS):
+        return "count" if role == "wheel_angle" else "count/s", BY_NAME
+    if role == "wheel_speed" and says(column.name, ("rpm",)):
+        return "rpm", BY_NAME
+    if role == "wheel_angle":
+        range_ = column.wraps_at
+        if not range_:
+            return ("deg", "its values are large") if size > 60 else ("rad", "they are small")
+        unit = {360.0: "deg", 2.0 * math.pi: "rad"}.get(range_, "count")
+        return unit, f"it starts again at {range_:g}"
+    units = USUAL[role].sizes
+    why = "not stated; by the size of the values" if len(units) > 1 else "not stated"
+    return next(unit for least, unit in units if size >= least), why
 
 
 def _put_gear_ratio(
@@ -171,31 +167,6 @@ def _put_gear_ratio(
     if of_motor:
         why = Marked("CHANGE: turns of the motor for one of the wheel")
     draft.put("gear_ratio", 1.0, why)
-
-
-def draft_channels(
-    chosen: dict[str, Candidate],
-    run: Run,
-    steady: bool,
-    stated: Stated,
-    parts: Mapping[str, Sequence[Candidate]],
-) -> dict[str, Draft]:
-    """Tables of the channels of one wheel, with units, signs and tares as the samples show them.
-
-    `parts` are the further columns of a role: y and z, where the chosen place is x.
-    """
-    drafts = {r: draft_of(r, column, run, stated, parts.get(r, ())) for r, column in chosen.items()}
-    rotation, ground = drafts.get("wheel_speed"), drafts.get("ground_speed")
-    radius = stated_radius(stated)
-    if rotation and ground and rotation.keys.get("unit") == "rad/s" and not rotation.column.unit:
-        size = {"mm/s": 1e-3, "cm/s": 1e-2}.get(ground.keys["unit"], 1.0) * ground.column.about.size
-        rotation.put("unit", *guess_rotation_unit(rotation.column.about.size, size, radius))
-    if (inputs := inputs_of(drafts, run, steady)) is not None:
-        signs(drafts, inputs)
-        tares(drafts, inputs)
-        far_sinkage(drafts, inputs, radius)
-        lifted(drafts, inputs)
-    return drafts
 
 
 def is_error(candidate: Candidate) -> bool:

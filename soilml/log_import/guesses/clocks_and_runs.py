@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import glob
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.log_import.channels.runs import alike_structs, files_by_run, key_words, run_names
-from soilml.log_import.guesses.behaviour import time_unit
-from soilml.log_import.guesses.columns import (
-    WHEEL_WORDS,
-    candidates_of,
-    name_scores,
-    says,
+from soilml.log_import.channels.runs import (
+    alike_structs,
+    files_by_run,
+    key_words,
+    matched_files,
+    run_names,
+    runs_of,
 )
-from soilml.log_import.mapping.log_map import FileKind
-from soilml.log_import.mapping.written_map import Marked
+from soilml.log_import.guesses.columns import candidates_of, time_unit
+from soilml.log_import.guesses.role_words import WHEEL_WORDS, name_scores, says
+from soilml.log_import.mapping.log_map import FileKind, LogMap, RunsMap, TimeMap
+from soilml.log_import.mapping.written_map import Marked, WrittenTable
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
 
@@ -29,82 +32,140 @@ _PAUSE = 5.0  # Shortest pause between two runs, s
 _OF_A_WHEEL = {"wheel", "wheels", "motor", "joint", "axle", "drive", "corner", "rad", "actuator"}
 _NUMBERED = {"id", "no", "nr", "number", "index", "idx", "name", "wheel", "num"}
 _MOST_WHEELS, _TURNS = 12, 0.2
-_SINCE_1970 = 5e8  # Seconds, and what is larger, of a clock that counts from 1970
 _MOST = 400  # Most rows of a table that somebody has made of runs
 Log = Sequence[Recording]
 
 
-def guess_clock(recordings: Log) -> tuple[str, str, str]:
+@dataclass
+class Division:
+    """What divides logs into runs, and their clocks; with the tables of the map that say it.
+
+    labels: Of wheels that take turns in the lines of a log.
+    """
+
+    kinds: tuple[FileKind, ...] = ()
+    time: TimeMap = field(default_factory=lambda: TimeMap(rate=100.0))
+    runs: RunsMap = field(default_factory=RunsMap)
+    labels: Sequence[str] = ()
+    tables: list[WrittenTable] = field(default_factory=list)
+
+
+def divide(logs: Sequence[Log], stated: Mapping[str, tuple[str, str]]) -> Division:
+    """The clock of logs, and what divides them into runs.
+
+    stated: Constants that the logs state, such as a `rate`.
+    """
+    found, log, runs = Division(), logs[0], WrittenTable("runs")
+    if rows := _rows_that_are_runs(logs):
+        found.runs = RunsMap(each_row=True)
+        runs.put("each_row", True, f"{rows} rows and no time: each is a run")
+        if name := _name_of_rows(log):
+            runs.put("column", name, "rows with one name were driven on one soil")
+        found.tables = [runs]
+        return found
+    column, labels, of_wheels = _label_column(log)
+    first = [recording for log in logs[:4] for recording in log]
+    found.labels = labels if of_wheels else ()
+    clock, unit, why = _clock(first)
+    if clock or any(recording.clock is not None for recording in first):
+        found.time = TimeMap(clock, unit)
+    elif "rate" in stated:
+        found.time = TimeMap(rate=float(stated["rate"][0].split()[0]))
+    structs = 0 if column else _structs_that_are_runs(log, clock)
+    if column:
+        found.runs = RunsMap(column)
+        why_so = f"{len(labels)} values, one run each"
+        if of_wheels:
+            why_so = f"a line for each wheel ({', '.join(labels[:4])}): each is a run"
+        runs.put("column", column, why_so)
+    elif structs:
+        found.runs = RunsMap(each_struct=True)
+        runs.put("each_struct", True, f"{structs} with the same columns")
+    else:
+        again, count, pause = _restarts_and_pauses(log, clock, unit)
+        found.runs = RunsMap(at_reset=again > 0, at_pause=pause)
+        if again:
+            runs.put("split_where_time_restarts", True, f"the time starts again {again} times")
+        elif count:
+            runs.put("split_at_pauses_over", f"{pause:g} s", f"the log pauses {count} times")
+    if kinds := _file_kinds(logs):
+        found.kinds = _with_clocks(logs, kinds, found)
+    found.tables = [*map(_file_table, found.kinds), _time_table(found.time, why, "rate" in stated)]
+    found.tables += [runs] if runs.keys else []
+    return found
+
+
+def _file_table(kind: FileKind) -> WrittenTable:
+    table = WrittenTable(f"files.{kind.name}", {"pattern": kind.pattern})
+    why = "times can be compared; 'start' where each clock starts at 0"
+    if kind.clock == "start":
+        why = "their clocks share no time: each starts at 0"
+    table.put("clock", kind.clock, why)
+    if kind.time_column:
+        table.keys |= {"time": kind.time_column, "time_unit": kind.time_unit}
+    return table
+
+
+def _time_table(time: TimeMap, why: str, rate_is_stated: bool) -> WrittenTable:
+    table = WrittenTable("time")
+    if time.column:
+        named = "time" in name_scores(time.column)
+        doubt = "" if named else Marked("CHANGE: its name is of no time; it rises evenly")
+        table.put("column", time.column, doubt)
+        table.put("unit", time.unit, why)
+    elif time.rate:
+        why = "stated in the log" if rate_is_stated else Marked("CHANGE: no column is a clock")
+        table.put("rate", f"{time.rate:g} Hz", why)
+    else:
+        return WrittenTable(before=["# Time comes from the messages."])
+    return table
+
+
+def _clock(recordings: Log) -> tuple[str, str, str]:
     """Column of time, its unit, and the comment on it; empty texts where there is none.
 
-    The comment marks a unit that the log does not state and no size shows: clocks since 1970, days
-    of spreadsheets and seconds with steps below one are clear.
+    The comment marks a unit that the log does not state and no size shows.
     """
     best = (_LEAST, "", "", "")
     for recording in recordings:
         for c in candidates_of([recording]) if recording.clock is None else ():
-            score = c.scores.get("time", 0.0)
-            if score > best[0]:
-                values = recording.columns[c.name]
-                unit = c.unit if c.kind == "s" and c.unit else time_unit(values)
-                step = float(np.median(np.diff(values[np.isfinite(values)])))
-                clear = abs(c.about.low) > _SINCE_1970 or unit == "d" or (unit == "s" and step < 1)
-                why = "CHANGE: not stated; by the size of its steps"
-                best = (score, c.name, unit, "" if c.kind == "s" or clear else Marked(why))
+            if c.score("time") > best[0]:
+                unit, clear = time_unit(recording.columns[c.name])
+                why = "" if clear else Marked("CHANGE: not stated; by the size of its steps")
+                unit, why = (c.unit, "") if c.kind == "s" else (unit, why)
+                best = (c.score("time"), c.name, unit, why)
     return best[1:]
 
 
-def _labels(recording: Recording, numbers_too: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
-    """Columns of text, and of some numbers as texts."""
-    yield from recording.texts.items()
-    for name in numbers_too:
-        if np.isfinite(recording.columns[name]).all():
-            yield name, [f"{value:g}" for value in recording.columns[name]]
+def _label_column(recordings: Log) -> tuple[str, list[str], bool]:
+    """A column that names runs, or wheels that take turns; its labels, and whether of wheels.
 
-
-def guess_run_column(recordings: Log) -> tuple[str, int]:
-    """A column whose value names the run, and how many there are; "" where no column does."""
-    for recording in recordings:
-        named = [name for name in recording.columns if "run" in name_scores(name)]
-        for name, cells in _labels(recording, named):
-            count = len(set(cells))
-            changes = sum(a != b for a, b in pairwise(cells))
-            if 1 < count <= min(_MOST_RUNS, len(cells) / 20) and changes == count - 1:
-                return name, count
-    return "", 0
-
-
-def guess_wheel_column(recordings: Log) -> tuple[str, list[str]]:
-    """A column that says of which wheel a line is, and its wheels; "" and [] where none does.
-
-    Its value changes from line to line, as the wheels take turns.
+    One of runs keeps its value for many lines, one of wheels changes it from line to line. An empty
+    text where there is none.
     """
     for recording in recordings:
-        numbers = [
-            name for name, values in recording.columns.items()
-            if says(name, _OF_A_WHEEL) and says(name, _NUMBERED)
+        numbers = {
+            name: [f"{value:g}" for value in values]
+            for name, values in recording.columns.items()
+            if ("run" in name_scores(name) or (says(name, _OF_A_WHEEL) and says(name, _NUMBERED)))
             and np.all(values == np.round(values))
-        ]  # fmt: skip
-        for name, cells in _labels(recording, numbers):
+        }
+        for name, cells in (recording.texts | numbers).items():
             labels = list(dict.fromkeys(cells))
-            if 1 < len(labels) <= _MOST_WHEELS and "" not in labels:
-                sides = all(says(label, WHEEL_WORDS) for label in labels)
-                changes = sum(a != b for a, b in pairwise(cells))
-                if changes > _TURNS * len(cells) and (sides or says(name, _OF_A_WHEEL)):
-                    return name, labels
-    return "", []
+            changes = sum(a != b for a, b in pairwise(cells))
+            if not 1 < len(labels) <= _MOST_RUNS:
+                continue
+            if changes == len(labels) - 1 and len(labels) <= len(cells) / 20:
+                return name, labels, False
+            of_wheel = says(name, _OF_A_WHEEL)
+            sides = all(says(label, WHEEL_WORDS) for label in labels)
+            take_turns = len(labels) <= _MOST_WHEELS and changes > _TURNS * len(cells)
+            if take_turns and "" not in labels and (sides or of_wheel):
+                return name, labels, True
+    return "", [], False
 
 
-def lines_of_first(recordings: Log, column: str) -> list[Recording]:
-    """The recordings with the lines of one label alone, where they have this column."""
-    found = []
-    for recording in recordings:
-        cells = np.asarray(recording.texts.get(column) or recording.columns.get(column, []))
-        found.append(recording.rows(cells == cells[0]) if cells.size else recording)
-    return found
-
-
-def structs_are_runs(recordings: Log, clock: str) -> int:
+def _structs_that_are_runs(recordings: Log, clock: str) -> int:
     """How many structs of a file have the same columns and clock, and are not one for each wheel.
 
     `test_1`, `test_2` are runs; `front_left`, `front_right` and `wheel_1`, `wheel_2` are wheels.
@@ -116,7 +177,7 @@ def structs_are_runs(recordings: Log, clock: str) -> int:
     return 0 if any(says(r.name, of_wheels) for r in alike) else len(alike)
 
 
-def restarts_and_pauses(recordings: Log, column: str, unit: str) -> tuple[int, int, float]:
+def _restarts_and_pauses(recordings: Log, column: str, unit: str) -> tuple[int, int, float]:
     """How often the clock starts again from its beginning, and how often a log pauses between runs;
     with a length below that of these pauses, s, infinite without one.
 
@@ -148,7 +209,7 @@ def refuse_a_table_of_runs(log: Log) -> None:
             )
 
 
-def guess_file_kinds(logs: Sequence[Log]) -> tuple[FileKind, ...]:
+def _file_kinds(logs: Sequence[Log]) -> tuple[FileKind, ...]:
     """Kinds of files with different columns that have one run in common; empty for one kind.
 
     The words that the names of all files of a kind share, and not those of all kinds, are its
@@ -163,10 +224,10 @@ def guess_file_kinds(logs: Sequence[Log]) -> tuple[FileKind, ...]:
     words = [key_words(name, set()) for name in run_names([log[0].file for log in logs])]
     plain = [[word.rstrip("0123456789") or word for word in own] for own in words]
     members = list(groups.values())
-    return _kinds_of(logs, members, words) or _kinds_of(logs, members, plain)
+    return _kinds_by(logs, members, words) or _kinds_by(logs, members, plain)
 
 
-def _kinds_of(
+def _kinds_by(
     logs: Sequence[Log], groups: list[list[int]], words: list[list[str]]
 ) -> tuple[FileKind, ...]:
     """The kinds by the words of their names; empty where these do not tell them."""
@@ -190,7 +251,24 @@ def _kinds_of(
     return tuple(kinds) if any(whole) else ()
 
 
-def rows_are_runs(logs: Sequence[Log]) -> int:
+def _with_clocks(
+    logs: Sequence[Log], kinds: Sequence[FileKind], found: Division
+) -> tuple[FileKind, ...]:
+    """Kinds with their own columns of time, and with clocks that overlap."""
+    members = next(iter(matched_files(logs, kinds).values()))
+    named = []
+    for kind in kinds:
+        column, unit, _ = _clock([own for own, other in members if other is kind])
+        alike = (column, unit) == (found.time.column, found.time.unit)
+        named.append(kind if alike else replace(kind, time_column=column, time_unit=unit))
+    log_map = LogMap("map", files=tuple(named), time=found.time, runs=found.runs)
+    times = runs_of(logs, log_map)[0].times
+    if max(own[0] for own in times) >= min(own[-1] for own in times):
+        return tuple(replace(kind, clock="start") for kind in named)
+    return tuple(named)
+
+
+def _rows_that_are_runs(logs: Sequence[Log]) -> int:
     """How many rows the tables have, where each row is a steady run; 0 for logs over time.
 
     Such tables are short and have no column whose name or unit is a time.
@@ -209,7 +287,7 @@ def rows_are_runs(logs: Sequence[Log]) -> int:
     return sum(map(len, recordings))
 
 
-def run_of_rows(recordings: Log) -> str:
+def _name_of_rows(recordings: Log) -> str:
     """The column that names the run of each row; "" where none does."""
     names = [n for r in recordings for n in (*r.texts, *r.columns) if "run" in name_scores(n)]
     return next(iter([*names, *(name for r in recordings for name in r.texts)]), "")

@@ -159,22 +159,6 @@ def constants_in_name(name: str) -> Stated:
     return found
 
 
-def gears_in_names(names: Sequence[str]) -> tuple[str, Stated] | None:
-    """Wheels of different radius that the names of files tell apart, as `R130mm` and `R150mm` do.
-
-    A pattern that finds the wheel in each name; and by wheel radius or diameter, and its value as
-    it would be written in a map. None where a name says neither, or all say the same.
-    """
-    for constant, words in _CONSTANTS_IN_NAMES:
-        own = [constants_in_name(name).get(constant) for name in names]
-        matches = [re.search(words, name, re.IGNORECASE) for name in names]
-        gears = {m[0]: (constant, said[0]) for m, said in zip(matches, own, strict=True)
-                 if m and said}  # fmt: skip
-        if constant != "gear_ratio" and len(gears) > 1 and all(matches) and all(own):
-            return "(?i)" + re.sub(r"\((?!\?)", "(?:", words), gears
-    return None
-
-
 def number_in_names(role: str, names: Sequence[str]) -> tuple[str, str, list[float]] | None:
     """A pattern that finds a number for a role in all names of runs, its unit and the numbers."""
     for kind, pattern, unit in _IN_NAMES:

@@ -123,14 +123,14 @@ class WheelLegMap:
     """[wheel_leg]: a wheel with legs, each stance of which is a row.
 
     length: From the axle to the end of a leg, m.
-    zero: Angle at which a leg points straight down, rad; None where the log is to say.
+    zero: Angle at which a leg points straight down, rad.
     sensor_height: Height of the range-finder of [clearance] above the axle, m.
     half_width: Half of the angle around midstance over which sensors are averaged, rad.
     """
 
     legs: Annotated[int, Parameter("1", 3, 12, "how many legs it has")]
     length: Annotated[Uncertain, UncertainIn("m", above=0.0)]
-    zero: Annotated[float | None, UncertainIn("rad", exact=True)] = None
+    zero: Annotated[float, UncertainIn("rad", exact=True)]
     sensor_height: Annotated[Uncertain, UncertainIn("m")] = NOTHING
     half_width: Annotated[float, UncertainIn("rad", above=0.0, exact=True)] = 0.1
 

@@ -10,12 +10,15 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
+
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.io.atomic_files import refuse_device
 from soilml.io.spreadsheet import ENDINGS, split_sheet
-from soilml.log_import.readers.missing_codes import without_codes
 from soilml.log_import.readers.side_files import side_lines
 from soilml.log_import.recording import Recording
+from soilml.remarks import Remark
 
 Progress = Callable[[str, int, int], None]  # Of a stage: items done, and their number
 #: Ending -> module and function; any other ending is read as text.
@@ -38,6 +41,11 @@ _OTHERS = {
     **dict.fromkeys((".gz", ".zip", ".bz2", ".xz", ".7z", ".tar"), "is packed; unpack it"),
     ".tdms": "is a binary file of LabVIEW; save it as text (.lvm or CSV)",
 }
+#: Ends of the ranges of integers, which converters without a signal show.
+_ENDS = (32767.0, -32768.0, 65535.0, 2147483647.0, -2147483648.0, 4294967295.0)
+_HUGE = 1e30  # From this size on no reading of a rig is meant; squares of smaller ones are finite
+#: How often a code must stand in a column, and how many ranges of all other readings away.
+_LEAST, _RANGES = 2, 3.0
 
 
 def read_log(path: str | Path, progress: Callable[[int], None] | None = None) -> list[Recording]:
@@ -76,7 +84,7 @@ def read_log(path: str | Path, progress: Callable[[int], None] | None = None) ->
     try:
         refuse_device(file)
         beside = side_lines(file)
-        found_in = map(without_codes, read(Path(path) if sheet else file, *told))
+        found_in = map(_without_codes, read(Path(path) if sheet else file, *told))
         return [replace(own, about=(*own.about, *beside)) for own in found_in]
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from None
@@ -100,3 +108,42 @@ def read_logs(files: Sequence[Path], progress: Progress) -> list[list[Recording]
 
 def silent(stage: str, done: int, total: int) -> None:
     """Progress that is not shown."""
+
+
+def _without_codes(recording: Recording) -> Recording:
+    """The recording with NaN where a column has the code of a missing reading or a huge number, and
+    where its clock has a huge one; a note says it.
+    """
+    notes = list(recording.notes)
+
+    def known(name: str, values: Floats, with_code: bool = True) -> Floats:
+        if (huge := np.abs(values) >= _HUGE).any():
+            text = f"{name}: {int(huge.sum())} numbers of {_HUGE:g} or more are no readings"
+            notes.append(Remark("huge-numbers", text, (name,)))
+            values = np.where(huge, np.nan, values)
+        if with_code and (code := _code_of(values)) is not None:
+            found = values == code
+            text = f"{name}: {code:g} is no reading, and left out {int(found.sum())} times"
+            notes.append(Remark("missing-code", text, (name,)))
+            values = np.where(found, np.nan, values)
+        return values
+
+    clock = recording.clock
+    if clock is not None:
+        clock = known("the clock", clock, with_code=False)
+    columns = {name: known(name, values) for name, values in recording.columns.items()}
+    return replace(recording, columns=columns, clock=clock, notes=tuple(notes))
+
+
+def _code_of(values: Floats) -> float | None:
+    """The code of a missing reading in a column; None where it has none."""
+    known = values[np.isfinite(values)]
+    for end in (float(known.min()), float(known.max())) if known.size >= _LEAST else ():
+        rest = known[known != end]
+        digits = f"{abs(end):.10g}".replace(".", "")
+        is_code = (len(digits) >= 3 and {*digits} == {"9"}) or end in _ENDS
+        if is_code and rest.size and known.size - rest.size >= _LEAST:
+            low, high = float(rest.min()), float(rest.max())
+            if max(low - end, end - high) > _RANGES * (high - low):
+                return end
+    return None

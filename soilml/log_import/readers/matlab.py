@@ -20,7 +20,6 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.io.bounds import DEPTH, LOG_VALUES, PARTS
-from soilml.io.cell_text import read_number
 from soilml.log_import.recording import Recording
 from soilml.optional_imports import need
 
@@ -65,27 +64,7 @@ def read_matlab(path: Path) -> list[Recording]:
         named = {f"{parent}[{length}]": columns for (parent, length), columns in groups.items()}
     if len(named) == 1:
         named = {"": next(iter(named.values()))}
-    _add_settings_of_tests(named, about)
     return [Recording(name, path, columns, about=about) for name, columns in named.items()]
-
-
-def _add_settings_of_tests(named: dict[str, dict[str, Floats]], about: tuple[str, ...]) -> None:
-    """Add numbers that differ between alike structs, such as the load of each test, as columns."""
-    numbers: dict[str, dict[str, float]] = {}
-    for line in about:
-        place, _, text = line.partition(" = ")
-        parent, _, name = place.rpartition(".")
-        try:
-            numbers.setdefault(name, {})[parent] = read_number(text)
-        except ValueError:
-            continue
-    for name, by_struct in numbers.items():
-        own = [parent for parent in named if parent in by_struct and name not in named[parent]]
-        if len(set(by_struct.values())) < 2 or len(own) < len(named):
-            continue
-        for parent in own:
-            length = len(next(iter(named[parent].values())))
-            named[parent][name] = np.full(length, by_struct[parent])
 
 
 def _split(name: str, array: Any) -> Iterator[tuple[str, Floats]]:

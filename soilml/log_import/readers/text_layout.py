@@ -14,6 +14,7 @@ from pathlib import Path
 from soilml.errors import InputError
 from soilml.io.bounds import COLUMNS
 from soilml.io.cell_text import read_number
+from soilml.log_import.readers.text_cells import is_number
 from soilml.log_import.units import known_unit
 
 _MARKS = (
@@ -23,18 +24,7 @@ _MARKS = (
 )
 #: Bytes above ASCII in a row, and the share of those in pairs or more that says Chinese.
 _HIGH, _PAIRED = re.compile(rb"[\x80-\xff]+"), 0.8
-#: Cells that stand for a missing number.
-MISSING = {
-    "", "nan", "na", "n/a", "null", "none", "-", "--", "---", "#n/a", "inf", "-inf", "+inf",
-    "nan(ind)", "-nan(ind)", "-nan", "1.#qnan", "-1.#ind", "missing", "?", "overflow",
-}  # fmt: skip
 COMMENTS = ("#", "%", "//", ";;")
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?", re.ASCII)
-_COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eEdD][+-]?\d+)?", re.ASCII)
-#: Thousands that cannot be taken for decimals: both marks, or two groups.
-_COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3}){1,}\.\d*|[+-]?[1-9]\d{0,2}(,\d{3}){2,}", re.ASCII)
-_DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3}){1,},\d*|[+-]?[1-9]\d{0,2}(\.\d{3}){2,}", re.ASCII)
-_SPACES = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?", re.ASCII)
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
 #: A quantity over its unit, as `Zeit / s` and `T in N m`.
 _OVER_UNIT = re.compile(r"^(.+?\w)\s+(?:/|in)\s+(\S.{0,15})$")
@@ -169,18 +159,6 @@ def cells_of(line: str, separator: str) -> list[str]:
         return split_line(line, separator)
     except csv.Error:
         return []
-
-
-def is_number(cell: str, decimal_comma: bool = False) -> bool:
-    """Whether a cell is a number, or stands for a missing one."""
-    text = cell.strip()
-    if text.lower() in MISSING or _NUMBER.fullmatch(text):
-        return True
-    if _SPACES.fullmatch(text) and "," * decimal_comma in text:
-        return True
-    if decimal_comma:
-        return bool(_COMMA_NUMBER.fullmatch(text) or _DOTS.fullmatch(text))
-    return bool(_COMMAS.fullmatch(text))
 
 
 def name_and_unit(cell: str) -> tuple[str, str]:

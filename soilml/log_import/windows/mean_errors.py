@@ -15,11 +15,9 @@ _FEWEST, _LEAST_FREEDOM = 4.0, 4.0
 #: Degrees of freedom of a window's own error, and those that the usual error counts with.
 _OWN, _USUAL = 8.0, 4.0
 _FEWEST_WINDOWS = 4  # Fewest windows that tell what is usual
-#: Parts that a window is divided into: for motion without noise of the places, and for noisy
-#: places, the first number in which noise is less than half of the variance.
-_FINE, _COARSE = 128, (16, 8)
-#: Correlation of neighbouring rates below which noise of the places outweighs real motion.
-_NOISY = -0.2
+#: Most parts that a window is divided into, for its rates; least share of their slow variance that
+#: is no noise of the places.
+_PARTS, _LEAST_SLOW = 128, 0.1
 
 
 def time_and_window(values: Floats) -> tuple[float, int, float]:
@@ -99,9 +97,15 @@ def slow_error(values: Floats) -> float:
     n = values.size
     if n < 2 * _COSINES:
         return 0.0
+    return float(np.sqrt(np.sum(_slow_powers(values)) / (n * (_COSINES - 2.0))))
+
+
+def _slow_powers(values: Floats) -> Floats:
+    """The squares of Lambda_j of samples (n,), (B,)."""
+    n = values.size
     phase = np.pi * (np.arange(n) + 0.5) / n
     weights = np.sqrt(2.0 / n) * np.cos(np.arange(1, _COSINES + 1)[:, None] * phase)
-    return float(np.sqrt(np.sum((weights @ values) ** 2) / (n * (_COSINES - 2.0))))
+    return np.asarray((weights @ values) ** 2)
 
 
 def pooled_errors(errors: Floats, lengths: Floats) -> Floats:
@@ -141,7 +145,7 @@ def travel_ratio(
     blurred by noise of the places. Its rates from part to part of the window have a long-run
     variance S, in which the noise of the places cancels: what it adds to one part it takes from
     the next. The slope of a line over the time t has the variance :math:`6 S / (5 t)`, to which
-    :math:`12 \sigma^2 / (n t^2)` is added for the noise of n means of parts. For two speeds the
+    that of the noise is added. For two speeds the
     error is that of the mean of the rates.
     """
     both = np.isfinite(rim) & np.isfinite(ground)
@@ -170,44 +174,24 @@ def _slope(time: Floats, values: Floats) -> float:
 
 
 def _slope_error(time: Floats, difference: Floats, interval: float) -> float:
-    """Standard error of the mean rate of a place that wanders and is noisy, m/s."""
+    r"""Standard error of the mean rate of a place (n,) that wanders and is noisy, m/s.
+
+    .. math:: \sigma^2 = \frac{6}{5} \sigma_s^2 + \frac{12 \sigma_p^2}{m t^2}
+
+    with the slow error of the rates between the means of m parts, less what the noise of the
+    places adds to it; the noise of a mean is that of second differences.
+    """
     span = float(time[-1] - time[0])
     residual = difference - difference.mean() - _slope(time, difference) * (time - time.mean())
-    fine = min(_FINE, residual.size // 2)
+    count = min(_PARTS, residual.size // 2)
     if interval > 0.0:
         # between two samples a place is a straight line, in which noise looks like real motion
-        fine = max(min(fine, int(span / (2.0 * interval))), min(_COARSE[0], fine))
-    rates, length = _rates(residual, span, fine)
-    size, neighbours = _two_correlations(rates)
-    if neighbours > _NOISY * size:
-        tau, last, _ = time_and_window(rates)
-        freedom = max(rates.size / (2.0 * last + 1.0), 4.0)
-        wander = size * length * tau / (1.0 - min(tau / rates.size, 0.5))
-        return float(np.sqrt(1.2 * wander / span * freedom / (freedom - 2.0)))
-    # white noise of means of one fine part: neighbours have the covariance -(sigma / length)^2
-    variance = -neighbours * length**2 / rates.size
-    for count in _COARSE:
-        rates, length = _rates(residual, span, min(count, residual.size // 2))
-        size, neighbours = _two_correlations(rates)
-        noise = variance * count / length**2
-        if noise < 0.25 * size:
-            break
-    # the difference of two large numbers: half of its standard error is allowed for
-    spread = size * np.sqrt(2.0 / count)
-    wander = (max(size + 2.0 * neighbours, size - 2.0 * noise, 0.0) + 0.5 * spread) * length
-    freedom = max(count - 1.0, 4.0)
-    return float(
-        np.sqrt(1.2 * wander / span * freedom / (freedom - 2.0) + 12.0 * variance / span**2)
-    )
-
-
-def _rates(residual: Floats, span: float, count: int) -> tuple[Floats, float]:
-    """Rates between the means of neighbouring parts, and the length of a part."""
+        count = max(min(count, int(span / (2.0 * interval))), min(2 * _COSINES + 1, count))
     edges = np.linspace(0, residual.size, count + 1).astype(int)
     means = np.asarray([part.mean() for part in np.split(residual, edges[1:-1])])
-    return np.diff(means) * count / span, span / count
-
-
-def _two_correlations(rates: Floats) -> tuple[float, float]:
-    """Mean square of the rates, and mean product of neighbours."""
-    return float(np.mean(rates**2)), float(np.mean(rates[1:] * rates[:-1]))
+    powers, rate = _slow_powers(np.diff(means) * count / span), count / span
+    noise = float(np.mean(np.diff(means, 2) ** 2)) / 6.0
+    added = 2.0 * noise * rate**2 * (1.0 - np.cos(np.pi * np.arange(1, _COSINES + 1) / count))
+    slow = max(float(np.sum(powers - added)), _LEAST_SLOW * float(np.sum(powers)))
+    slow /= (count - 1.0) * (_COSINES - 2.0)
+    return float(np.sqrt(1.2 * slow + 12.0 * noise / (count * span**2)))

@@ -23,11 +23,8 @@ _WATCHED = {"rim_speed": 0.01, "speed": 0.015, "slip": 0.01, "torque": 0.03, "lo
 _MOST_VALUES, _SHORTEST_MEAN = 500, 0.1
 _MISSING = 0.2  # Largest share of missing samples in a window
 _SIGNIFICANT = 4.0  # A change within a window counts where it is this many standard errors
-_FINER = 3.0  # How much more sensitive the second search is, in a piece that drifts
-#: Share of the usual speed of the rim, or of the usual torque, below which a wheel is at rest.
+#: Share of the usual speed, or of the usual torque, below which a wheel is at rest.
 _AT_REST = 0.1
-#: Beginning of a log in which the wheel may rest, s, and a slip that is another than there.
-_FIRST, _OTHER_SLIP = 0.4, 0.03
 
 
 @dataclass(frozen=True)
@@ -44,6 +41,7 @@ def steady_windows(
     quantities: Mapping[str, Floats],
     settings: WindowSettings,
     left_out: tuple[LeaveOut, ...] = (),
+    motion: Floats | None = None,
 ) -> list[Stretch]:
     """Divide a run into steady windows and stretches that are left out, in order of time.
 
@@ -51,16 +49,36 @@ def steady_windows(
     quantities: Samples (n,) by name: `rim_speed`, `speed`, `torque`, ...
     settings: How steady and how long windows are.
     left_out: Stretches that the user leaves out of this run.
+    motion: What is zero where the wheel rests (n,); None where nothing says it.
     """
-    search = _Search(time, quantities, settings)
-    found: list[Stretch] = []
-    for start, stop in search.pieces(np.arange(time.size), settings.sensitivity):
-        for p, q in _without(start, stop, settings, left_out):
-            found += search.judged(p, q)
-    for entry in left_out:
-        ends = max(entry.start, float(time[0])), min(entry.stop, float(time[-1]))
-        found.append(Stretch(*ends, Remark("left-out-by-map", entry.why, severity="note")))
+    search = _Search(time, quantities, settings, motion)
+    parts, found = searched_parts(time, settings, left_out)
+    for part in parts:
+        rows = np.flatnonzero(search.inside(*part))
+        for start, stop in search.pieces(rows) if rows.size > 1 else ():
+            found.append(search.judged(start, stop))
     return _joined(sorted(found, key=lambda s: s.start), settings)
+
+
+def searched_parts(
+    time: Floats, settings: WindowSettings, left_out: tuple[LeaveOut, ...]
+) -> tuple[list[tuple[float, float]], list[Stretch]]:
+    """The parts of a run (from, until; s) in which rows are searched, and what the map leaves out.
+
+    time: Grid (n,), s.
+    """
+    first, last = float(time[0]), float(time[-1])
+    low, high = settings.within
+    outside = Remark("outside", "outside of [windows] within", severity="note")
+    out = [Stretch(first, min(low, last), outside), Stretch(max(high, first), last, outside)]
+    for entry in left_out:
+        why = Remark("left-out-by-map", entry.why, severity="note")
+        out.append(Stretch(max(entry.start, first), min(entry.stop, last), why))
+    out = sorted((s for s in out if s.start < s.stop), key=lambda s: s.start)
+    starts = [first, *np.maximum.accumulate([s.stop for s in out])] if out else [first]
+    stops = [*(s.start for s in out), last]
+    parts = [(float(a), b) for a, b in zip(starts, stops, strict=True) if a < b]
+    return parts, out
 
 
 def _joined(stretches: list[Stretch], settings: WindowSettings) -> list[Stretch]:
@@ -75,21 +93,6 @@ def _joined(stretches: list[Stretch], settings: WindowSettings) -> list[Stretch]
     return found
 
 
-def _without(
-    start: float, stop: float, settings: WindowSettings, left_out: tuple[LeaveOut, ...]
-) -> list[tuple[float, float]]:
-    """A piece without what the user leaves out; what is outside of `within` is kept apart."""
-    edges = [start, *(edge for edge in settings.within if start < edge < stop), stop]
-    parts = list(pairwise(edges))
-    for cut in left_out:
-        halves = (
-            ((p, min(q, cut.start)) for p, q in parts),
-            ((max(p, cut.stop), q) for p, q in parts),
-        )
-        parts = sorted(piece for half in halves for piece in half if piece[0] < piece[1])
-    return parts
-
-
 @dataclass(frozen=True)
 class _Search:
     """A run in which steady windows are searched: its grid (n,) and its samples by name (n,)."""
@@ -97,6 +100,7 @@ class _Search:
     time: Floats
     quantities: Mapping[str, Floats]
     settings: WindowSettings
+    motion: Floats | None
 
     @property
     def step(self) -> float:
@@ -107,7 +111,7 @@ class _Search:
         values = self.quantities.get(name)
         return None if values is None or not np.isfinite(values[rows]).any() else values[rows]
 
-    def pieces(self, rows: NDArray[np.intp], sensitivity: float) -> list[tuple[float, float]]:
+    def pieces(self, rows: NDArray[np.intp]) -> list[tuple[float, float]]:
         """Pieces of a part of the run between change points, s, without the settling at its ends.
 
         At most a fifth of a piece is settling on each side.
@@ -132,7 +136,9 @@ class _Search:
         if not columns:
             return [(float(time[0]), float(time[-1]))]
         shortest = max(1, round(0.25 * settings.shortest / (width * step)))
-        parts = steady_pieces(np.stack(columns, axis=1), np.asarray(least), sensitivity, shortest)
+        parts = steady_pieces(
+            np.stack(columns, axis=1), np.asarray(least), settings.sensitivity, shortest
+        )
         edges = float(time[0]) + step * width * np.asarray([a for a, _ in parts] + [parts[-1][1]])
         edges[-1] = time[-1]
         found = []
@@ -146,26 +152,18 @@ class _Search:
         """Samples (n,) of a stretch."""
         return np.asarray((self.time >= start) & (self.time <= stop))
 
-    def judged(self, start: float, stop: float, finer: bool = True) -> list[Stretch]:
-        """A piece as one stretch; where it drifts, as what a finer search makes of it."""
+    def judged(self, start: float, stop: float) -> Stretch:
+        """A piece as one stretch; where it drifts, as its longest part that is steady."""
         a, b = without_transients(self.time, self.quantities, start, stop)
         why = self.why_not(a, b)
-        if why is None or why.code != "not-steady":
-            return [Stretch(a, b, why)]
-        if not finer:
-            return [self.shortened(Stretch(a, b, why))]
-        rows = np.flatnonzero(self.inside(start, stop))
-        parts = self.pieces(rows, _FINER * self.settings.sensitivity)
-        return [stretch for p, q in parts for stretch in self.judged(p, q, finer=False)]
+        stretch = Stretch(a, b, why)
+        return self.shortened(stretch) if why and why.code == "not-steady" else stretch
 
     def why_not(self, start: float, stop: float) -> Remark | None:
         """Why a stretch is no steady window; a part of one that is `not-steady` may be one."""
         rows, shortest = self.inside(start, stop), self.settings.shortest
-        low, high = self.settings.within
-        if stop <= low or start >= high:
-            return Remark("outside", "outside of [windows] within", severity="note")
-        if rests := self.why_at_rest(rows):
-            return rests
+        if self.rests(rows):
+            return Remark("at-rest", "the wheel is at rest", severity="note")
         if stop - start < shortest:
             text = f"{stop - start:.2g} s are too short (less than {shortest:g} s)"
             return Remark("too-short", text, severity="note")
@@ -204,28 +202,10 @@ class _Search:
                     return Stretch(a, b)
         return stretch
 
-    def why_at_rest(self, rows: NDArray[np.bool_]) -> Remark | None:
-        """By what the wheel is at rest in a window; None where it turns, or nothing says it."""
-        rim = self.quantities.get("rim_speed", self.quantities.get("speed"))
-        if rim is not None and np.isfinite(rim[rows]).any():
-            usual = float(np.nanpercentile(np.abs(rim), 90))
-            rests = float(np.nanmedian(np.abs(rim[rows]))) < _AT_REST * usual
-            return Remark("at-rest", "the wheel is at rest", severity="note") if rests else None
-        torque = self.quantities.get("torque")
-        if torque is None or not np.isfinite(torque[rows]).any():
-            return None
-        near_zero = _AT_REST * float(np.nanpercentile(np.abs(torque), 90))
-        if float(np.nanmedian(np.abs(torque[rows]))) >= near_zero:
-            return None
-        # where a wheel begins to brake, slip varies little and is not that of the rest before
-        first = slice(0, max(3, round(_FIRST / self.step)))
-        slip, before = self.known("slip", rows), self.known("slip", first)
-        rested = self.known("torque", first)
-        if slip is not None and before is not None and rested is not None:
-            middle = float(np.nanmedian(slip))
-            other = abs(middle - float(np.nanmedian(before))) > _OTHER_SLIP
-            steady = float(np.nanstd(slip)) < 0.5 * abs(middle)
-            if steady and other and abs(np.nanmedian(rested)) < near_zero:
-                return None
-        text = "the torque is near zero: the wheel is probably at rest"
-        return Remark("torque-near-zero", text, ("torque",))
+    def rests(self, rows: NDArray[np.bool_]) -> bool:
+        """Whether the wheel is at rest in a window; not where nothing says it."""
+        motion = self.motion
+        if motion is None or not np.isfinite(motion[rows]).any():
+            return False
+        usual = float(np.nanpercentile(np.abs(motion), 90))
+        return float(np.nanmedian(np.abs(motion[rows]))) < _AT_REST * usual

@@ -63,7 +63,7 @@ class LegSoil:
         return np.sqrt(np.diag(self.of_strides + self.deviations @ self.deviations.T))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SlipLine:
     """Slip from a reading x (SI) of a stride, i = a + b x, (a, b) = of_soil (1, phi, sigma_1)."""
 
@@ -79,15 +79,13 @@ class SlipLine:
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class StrideRelation:
-    r"""Slip i from a reading x (SI) of a stride and one number y of the soil.
+class StrideRelation(SlipLine):
+    r"""A line with one number y of the soil, which a single stride determines.
 
     .. math:: i = p + q x + y (r + s x)
 
     at_none: (p, q). rate: (r, s).
-    of_soil (3,): y = of_soil (1, phi, sigma_1).
     to_soil (2, 2): (phi, sigma_1) = to_soil (1, y).
-    slip_std: Standard error of the slip, table VI.
 
     References: Comin and Saaj 2017, eqs. 18, 19, 24, 25, 27 and 28, tables IV to VIII. Valid for a
     five-legged wheel-leg with Load Testing Feet under a similar load, at slips of 0 to 0.5.
@@ -95,16 +93,8 @@ class StrideRelation:
 
     at_none: tuple[float, float]
     rate: tuple[float, float]
-    of_soil: Floats
     to_soil: Floats
-    slip_std: float
     errors: SoilErrors
-
-    def line(self, friction_angle: Real, normal_stiffness: Real) -> tuple[Floats, Floats]:
-        """Intercept and slope of i over x on a soil of this angle (rad) and stiffness (Pa)."""
-        c, p, q = self.of_soil
-        y = c + p * np.asarray(friction_angle) + q * np.asarray(normal_stiffness)
-        return self.at_none[0] + self.rate[0] * y, self.at_none[1] + self.rate[1] * y
 
     def soil(self, reading: Real, slip: Real) -> LegSoil:
         """Estimate the soil from readings (SI) and slips, one pair (n,) for each stride.
@@ -182,6 +172,19 @@ def soil_spring(friction_angle: Real, normal_stiffness: Real) -> tuple[Floats, F
     return drop, k
 
 
+def _of_spring(intercept: float, by_stiffness: float) -> Floats:
+    """(2, 3) of intercept and slope by the soil: table V, with the stiffness in kN/m.
+
+    It prints rad^-1 of the drop of friction: in radians the drop would have no effect on the slip.
+    """
+    by_spring = np.asarray(
+        [[0.022 * DEGREE, by_stiffness / STIFFNESS], [-0.156 * DEGREE / GRAVITY, 0.0]]
+    )
+    found = by_spring @ SPRING_OF_SOIL
+    found[:, 0] += [intercept, 6.609 / GRAVITY]
+    return np.asarray(found)
+
+
 #: Intercept of the simplified relation, which all soils share (eq. 19).
 INTERCEPT = -0.33
 #: Reading of the torque at midstance, N m: i = INTERCEPT + y x, phi = 1 - 0.58 y and
@@ -189,41 +192,38 @@ INTERCEPT = -0.33
 TORQUE = StrideRelation(
     at_none=(INTERCEPT, 0.0),
     rate=(0.0, 1.0),
-    of_soil=np.asarray([1.0 / 0.58, -1.0 / 0.58, 0.0]),
+    of_soil=np.asarray([[INTERCEPT, 0.0, 0.0], [1.0 / 0.58, -1.0 / 0.58, 0.0]]),
     to_soil=np.asarray([[1.0, -0.58], [PRESSURE * (-0.7 + 15.997 * INTERCEPT), PRESSURE * 20.928]]),
     slip_std=0.018**0.5,
     errors=TORQUE_ERRORS,
 )
-#: Reading of the vibration after midstance, m/s^2, with y the drop of friction (table V, linear,
-#: which prints rad^-1: in radians the drop would have no effect on the slip).
+#: Reading of the vibration after midstance, m/s^2, with y the drop of friction (table V, linear).
 VIBRATION = StrideRelation(
     at_none=(-0.882, 6.609 / GRAVITY),
     rate=(0.022 * DEGREE, -0.156 * DEGREE / GRAVITY),
-    of_soil=SPRING_OF_SOIL[0],
+    of_soil=_of_spring(-0.882, 0.0),
     to_soil=np.column_stack([SPRING[:, 0] + SPRING[:, 2] * ASSUMED_SPRING, SPRING[:, 1]]),
     slip_std=0.020**0.5,
     errors=VIBRATION_ERRORS,
 )
-#: By name. Table IV: phi and sigma_1 (N/cm^2) by intercept and slope, columns (1, a, b).
-TORQUE_SLIP: dict[str, SlipLine | StrideRelation] = {
+
+
+def _of_fit(friction: list[float], stiffness: list[float]) -> Floats:
+    """(2, 3) of (a, b) by the soil: table IV has phi and sigma_1 (N/cm^2) by (1, a, b)."""
+    return _inverse(np.asarray([friction, [PRESSURE * c for c in stiffness]]))
+
+
+TORQUE_SLIP: dict[str, SlipLine] = {
     "terramechanics": SlipLine(
-        _inverse(np.asarray([[0.661, -0.377, -0.466], [-0.356 * PRESSURE, 0.0, 1.434 * PRESSURE]])),
-        0.074**0.5,
+        of_soil=_of_fit([0.661, -0.377, -0.466], [-0.356, 0.0, 1.434]), slip_std=0.074**0.5
     ),
     "empirical": SlipLine(
-        _inverse(np.asarray([[1.0, 0.0, -0.58], PRESSURE * np.asarray([-0.7, 15.997, 20.928])])),
-        0.005**0.5,
+        of_soil=_of_fit([1.0, 0.0, -0.58], [-0.7, 15.997, 20.928]), slip_std=0.005**0.5
     ),
     "simplified": TORQUE,
 }
-#: By name. Table V: intercept by drop of friction and stiffness of the spring, slope by the drop.
-VIBRATION_SLIP: dict[str, SlipLine | StrideRelation] = {
-    "planar": SlipLine(
-        np.asarray([[-1.434, 0.0, 0.0], [6.609 / GRAVITY, 0.0, 0.0]])
-        + np.asarray([[0.022 * DEGREE, 0.789 / STIFFNESS], [-0.156 * DEGREE / GRAVITY, 0.0]])
-        @ SPRING_OF_SOIL,
-        0.015**0.5,
-    ),
+VIBRATION_SLIP: dict[str, SlipLine] = {
+    "planar": SlipLine(of_soil=_of_spring(-1.434, 0.789), slip_std=0.015**0.5),
     "linear": VIBRATION,
 }
 #: sigma_1 = s_sigma / z and phi = s_I + s_Z z by the midstance sinkage z (m): eq. 29, table VII.

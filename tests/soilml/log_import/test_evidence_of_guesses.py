@@ -137,19 +137,6 @@ def test_counts_of_a_converter_ask_for_the_calibration(tmp_path):
     assert 'scale = "1 N m"  # CHANGE: what 1 count is' in text and "torque" not in silent(text)
 
 
-def test_a_line_for_each_reading_of_a_bus(tmp_path):
-    """Time, signal, value and unit, as exports of CAN have them."""
-    d = drive(np.random.default_rng(8), (0.1, 0.3, 0.5), [60] * 3, rate=20)
-    signals = {"WheelSpeed": ("rad/s", d.omega), "VehicleSpeed": ("km/h", 3.6 * d.v),
-               "WheelTorque": ("Nm", d.torque), "WheelLoad": ("N", d.load)}  # fmt: skip
-    lines = [f"{t:.3f},{name},{values[i]:.5f},{unit}" for i, t in enumerate(d.t)
-             for name, (unit, values) in signals.items()]  # fmt: skip
-    (tmp_path / "can.csv").write_text("\n".join(["Timestamp,Signal,Value,Unit", *lines]))
-    text = init(tmp_path, [tmp_path / "can.csv"])
-    assert silent(text) == {"wheel_speed": "WheelSpeed", "ground_speed": "VehicleSpeed",
-                            "torque": "WheelTorque", "load": "WheelLoad"}  # fmt: skip
-
-
 def test_a_load_far_from_the_stated_mass_is_marked(tmp_path):
     log, _ = log_of(tmp_path)
     log.write_text("# rover mass: 12 kg, 6 wheels\n" + log.read_text())
@@ -262,21 +249,6 @@ def test_kinds_of_files_with_the_number_of_the_run(tmp_path, capsys):
     assert {line.split(",")[0] for line in rows} == {"1", "2"}
     assert main(["import", "--init", *map(str, logs[:-1])]) == 2
     assert "run 2: no file of the kind 'ft'" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("was_set", [True, False])
-def test_a_radius_by_a_slip_that_was_set_is_marked(was_set, tmp_path):
-    rng = np.random.default_rng(9)
-    d = drive(rng, (0.1, 0.3, 0.5), [60] * 3, rate=20)
-    stage = np.clip(((d.t - 4) // 12).astype(int), 0, 2)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slip = np.nan_to_num(1.0 - d.v / (RADIUS * d.omega))
-    slip = np.choose(stage, [0.07, 0.26, 0.46]) if was_set else slip
-    log = write(tmp_path / "log.csv", {
-        "time [s]": d.t, "omega [rad/s]": d.omega, "v [m/s]": d.v, "slip [-]": slip,
-        "torque [Nm]": d.torque, "Fz [N]": d.load}, digits=6)  # fmt: skip
-    text = init(tmp_path, [log])
-    assert "+- 1 %" in text and ("perhaps set and not measured" in text) == was_set
 
 
 def test_files_of_one_run_in_a_folder_each(tmp_path):

@@ -60,9 +60,15 @@ def logs_of_radii(folder, radii):
     return logs
 
 
+def map_of_radii(logs, radii):
+    """The map of such logs, with the gear of each in its name."""
+    text = init_map(logs).replace("# radius =", "gear_from = '_(R\\d+mm)_'\n# radius =")
+    return text + "".join(f'\n[gears.R{r}mm]\nradius = "{r} mm +- 1 %"\n' for r in radii)
+
+
 def test_wheels_of_different_radius_have_their_own_slip(tmp_path):
     logs = logs_of_radii(tmp_path, (100, 160))
-    (tmp_path / "map.toml").write_text(init_map(logs))
+    (tmp_path / "map.toml").write_text(map_of_radii(logs, (100, 160)))
     found = import_log(logs, tmp_path / "map.toml")
     rows = found.table
     radii = {"R100mm": 0.1, "R160mm": 0.16}
@@ -78,7 +84,7 @@ def test_wheels_of_different_radius_have_their_own_slip(tmp_path):
 
 def test_a_gear_without_a_radius_is_asked_for(tmp_path):
     logs = logs_of_radii(tmp_path, (100, 160))
-    text = init_map(logs)
+    text = map_of_radii(logs, (100, 160))
     (tmp_path / "map.toml").write_text(text.replace("[gears.R160mm]", "[gears.R150mm]"))
     with pytest.raises(InputError, match=r"has the gear 'R160mm', and \[gears\] does not"):
         import_log(logs, tmp_path / "map.toml")

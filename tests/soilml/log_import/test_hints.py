@@ -59,7 +59,10 @@ def test_a_right_map_gets_no_hint(log):
         # what the log has in SI units is taken for another unit: the wrong number arrives
         (changed("torque", unit="kN m"), "the torque is in N m and was read as kN m"),
         (changed("load", unit="N", reverse=True), "reverse = true in [load]"),
-        (changed("wheel_speed", unit="turns/s"), "is in rad/s, and was read as turns/s"),
+        (
+            changed("wheel_speed", unit="turns/s"),
+            "the wheel speed is in rad/s and was read as turns/s",
+        ),
         (changed("wheel", radius=2 * RADIUS), "was the radius of 0.3 m measured as diameter?"),
         (changed("ground_speed", reverse=True), "reverse = true in [ground_speed]"),
         (changed("torque", reverse=True), "reverse = true in [torque]"),
@@ -114,10 +117,10 @@ def rows(**changes):
         ({"slip": lambda x: x / 100}, "divided by 100 twice"),
         ({"drawbar_pull_N": lambda x: 1000 + x}, "was not tared"),
         ({"drawbar_pull_N": lambda x: -x}, "its sign is turned"),
-        ({"sinkage_m": lambda x: 1000 * x}, "probably it is in mm"),
-        ({"sinkage_m": lambda x: 100 * x}, "probably it is in cm"),
-        ({"sinkage_m": lambda x: 400 * x}, "probably it is in cm or mm"),
-        ({"sinkage_m": lambda x: 1e5 * x}, "probably it is in another unit"),
+        ({"sinkage_m": lambda x: 1000 * x}, "is in mm and was read as m"),
+        ({"sinkage_m": lambda x: 100 * x}, "is in cm and was read as m"),
+        ({"sinkage_m": lambda x: 400 * x}, "is in cm and was read as m, or the sinkage is in mm"),
+        ({"sinkage_m": lambda x: 1e5 * x}, "is no length"),
         ({"torque_Nm": lambda x: x * [1, 1, 9, 1]}, "look at that row"),
     ],
 )

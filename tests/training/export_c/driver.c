@@ -29,7 +29,7 @@ int main(void)
             *into[i] = strtof(next, &next);
         bool inside[1] = {false};
         const int alone = wheel_single(&row, &one, work);
-        const int step = wheel_set_step(memory, &row, 1, inside, work);
+        const int step = wheel_set_step(memory, &row, 1, inside, NULL, work);
         const int answer = wheel_set_answer(memory, &set, work);
         printf("%d %d %d", alone, step, answer);
         for (int i = 0; i < 3; ++i)

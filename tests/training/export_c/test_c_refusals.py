@@ -54,7 +54,7 @@ def test_a_bad_number_of_rows_changes_nothing(wheel, memory):
     before = bytes(memory)
     rows = wheel.rows(**{k: [v] * 33 for k, v in READING.items()})
     for count in (-1, 0, 33):
-        code = wheel.call("set_step", memory, rows, count, None, wheel.work)
+        code = wheel.call("set_step", memory, rows, count, None, None, wheel.work)
         assert code == wheel.codes["BAD_COUNT"]
     assert bytes(memory) == before
 

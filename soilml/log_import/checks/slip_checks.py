@@ -22,20 +22,19 @@ _MOVES, _FEWEST, _ODOMETRY, _RESOLUTION = 0.2, 3, 0.03, 1e-3
 #: Slips that are alike, and the ratio of the largest to the least effort that one slip seldom has:
 #: at a slip of 0.3 loads of 20 to 150 N give 1.2.
 _ALIKE, _WORKS = 0.01, 1.4
-_OURS = "1 - v/(r omega)"
+#: Fewest rows that tell a definition, the least difference of slip that is worth telling, and how
+#: many times better than the stated one another must fit.
+_FEWEST_ROWS, _LEAST, _BETTER = 4, 0.02, 2.0
+_OURS, _RATIO, _OF_TYRES = SLIP_DEFINITIONS
 _COMPUTED = "was the travel computed from the rotation of the wheel?"
-#: Fewest rows that tell, and the least difference of slip that is worth telling.
-_FEWEST_ROWS, _LEAST = 4, 0.02
-#: Another definition must fit the speeds so many times better than the stated one.
-_BETTER = 2.0
 
 
-def rates_hints(rows: RowsToCheck) -> Iterator[Hint]:
+def check_speeds(rows: RowsToCheck) -> Iterator[Hint]:
     """Rotation and travel, from which slip follows."""
-    rotation, travel = rows.channel(*ROTATIONS), rows.channel(*TRAVELS)
+    rotation, travel = rows.role(*ROTATIONS), rows.role(*TRAVELS)
     rim, ground = rows.of("rim_speed"), rows.of("speed")
     good = np.isfinite(rim) & np.isfinite(ground) & (rim != 0.0)
-    if not (rotation and travel and good.any()) or rows.channel("slip"):
+    if not (rotation and travel and good.any()) or rows.role("slip"):
         return
     assert rows.wheel is not None
     ratio, both = ground[good] / rim[good], (travel, rotation)
@@ -52,26 +51,27 @@ def rates_hints(rows: RowsToCheck) -> Iterator[Hint]:
         ratio = np.abs(ratio)
     middle, fastest = float(np.median(ratio)), float(np.max(ratio))
     radius = rows.wheel.radius.value if rows.wheel.radius else float("nan")
+    powers = {travel: 1, rotation: -1}
     if 0.0 < fastest < 0.3:
-        excess = f"{1.0 / fastest:.3g}"
-        cause = _other_speeds(rows, both, fastest, FASTEST) or (
-            f"probably it was measured before a gearbox of up to {excess} to 1 (write "
-            f"gear_ratio in [{rotation}]), or its unit is wrong"
+        excess, unit = f"{1.0 / fastest:.3g}", rows.units_that_give(fastest, FASTEST, **powers)
+        cause = (
+            f"it was measured before a gearbox of up to {excess} to 1 (write gear_ratio in "
+            f"[{rotation}]), or its unit is wrong"
         )
-        cause = "probably the radius is in mm" if radius > 2.0 else cause
+        cause = "the radius is in mm" if radius > 2.0 else ", or ".join(unit) or cause
         text = (
             f"slip is {1.0 - fastest:.4g} or more in all windows: the rim would be {excess} "
-            f"times as fast as the travel; {cause}"
+            f"times as fast as the travel; probably {cause}"
         )
         yield Hint("rotation-too-fast", text, (rotation,))
     elif middle > 3.0:
         gear = rows.wheel.channels[rotation].gear_ratio.value
-        cause = _other_speeds(rows, both, middle, _MIDDLE)
-        if not cause and gear > 1.0 and middle > 0.4 * gear:
-            cause = f"probably [{rotation}] was measured after the gearbox; remove gear_ratio"
-        cause = cause or f"probably the unit of [{travel}] or of [{rotation}] is wrong"
+        unit = rows.units_that_give(middle, _MIDDLE, **powers)
+        cause = f"the unit of [{travel}] or of [{rotation}] is wrong"
+        if gear > 1.0 and middle > 0.4 * gear:
+            cause = f"[{rotation}] was measured after the gearbox; remove gear_ratio"
         shown = f"travel is {middle:.3g} times as fast as the rim in the middle of the windows"
-        yield Hint("travel-too-fast", f"{shown}; {cause}", both)
+        yield Hint("travel-too-fast", f"{shown}; probably {', or '.join(unit) or cause}", both)
     elif 0.3 <= fastest < 0.55 and ratio.size > 2 and np.ptp(ratio) > 0.02:
         text = (
             f"slip is {1.0 - fastest:.2g} or more in all windows; was the radius of "
@@ -108,58 +108,37 @@ def _one_sensor(
     )
 
 
-def _other_speeds(
-    rows: RowsToCheck, roles: tuple[str, str], ratio: float, plausible: tuple[float, float]
-) -> str:
-    """The units by which travel over rim speed would be that of a wheel; "" for none.
-
-    roles: Travel and rotation. ratio: With the units that the map has.
-    """
-    found = []
-    for role, power in zip(reversed(roles), (-1, 1), strict=True):
-        read, others = rows.read_as(role)
-        found += [f"[{role}] is in {meant}, and was read as {read}"
-                  for meant, size in others.items()
-                  if plausible[0] < ratio * size**power < plausible[1]]  # fmt: skip
-    return f"probably {', or '.join(found)}" if found else ""
-
-
-def definition_hints(rows: RowsToCheck) -> Iterator[Hint]:
+def check_definition(rows: RowsToCheck) -> Iterator[Hint]:
     """Whether a slip is per cent, or by another definition."""
-    slip, logged = rows.known("slip"), bool(rows.channel("slip"))
-    if rows.wheel is not None and not logged:
+    slip, logged = rows.known("slip"), rows.channel("slip")
+    if rows.wheel is not None and logged is None:
         return
     if slip.size and float(np.median(np.abs(slip))) >= 1.0:
         shown = f"slip is {float(np.median(slip)):.3g} in the middle of the rows"
         write = rows.write("unit = '%'", "slip")
         yield Hint("slip-unit", f"{shown}: probably it is in per cent{write}", ("slip",))
         return
-    rim = rows.quantities.get("rim_speed")
-    if rim is None and "wheel_speed" in rows.quantities and rows.radius is not None:
-        rim = rows.quantities["wheel_speed"] * rows.radius
-    found, text = None, ""
-    if rim is not None and {"slip", "speed"} <= rows.quantities.keys():
-        stated = rows.wheel.channels["slip"].definition if logged and rows.wheel else _OURS
-        found = definition_by_speeds(rows.quantities["slip"], rim, rows.quantities["speed"], stated)
-    if found is not None:
-        definition, unit = found
-        lines = [f"definition = '{definition}'", *([f"unit = '{unit}'"] if unit else [])]
-        text = (
-            "slip disagrees with the speeds of rim and travel, and agrees by another "
-            f"definition: {definition}{' in per cent' if unit else ''}"
-            f"{rows.write(' and '.join(lines), 'slip')}"
-        )
+    rim = rows.of("rim_speed")
+    if "rim_speed" not in rows.quantities and rows.radius is not None:
+        rim = rows.of("wheel_speed") * rows.radius
+    stated = logged.definition if logged else _OURS
+    text, definition = "", _definition_by_speeds(rows.of("slip"), rim, rows.of("speed"), stated)
+    if definition:
+        text = f"slip disagrees with the speeds of rim and travel, and agrees by {definition}"
     elif (above := int(np.sum(slip > 1.0))) > 0:
+        definition = _OF_TYRES
         text = (
             f"slip is above 1 in {above} of {slip.size} rows, which {_OURS} cannot be: "
-            "probably the log has (r omega - v)/v"
-        ) + rows.write("definition = '(r omega - v)/v'", "slip")
+            f"probably the log has {definition}"
+        )
     elif _falls_with_slip(rows):
+        definition = _RATIO
         text = (
             "torque falls as slip grows: probably slip is the ratio of travel to rim speed, "
-            "v/(r omega)"
-        ) + rows.write("definition = 'v/(r omega)'", "slip")
+            f"{definition}"
+        )
     if text:
+        text += rows.write(f"definition = '{definition}'", "slip")
         yield Hint("slip-definition", text, ("slip", "torque"))
 
 
@@ -178,43 +157,36 @@ def _falls_with_slip(rows: RowsToCheck) -> bool:
     return bool(varies and np.corrcoef(slip, lever)[0, 1] < -0.9)
 
 
-def slip_hints(rows: RowsToCheck) -> Iterator[Hint]:
+def check_slips(rows: RowsToCheck) -> Iterator[Hint]:
     """Slips that a unit, the radius or a single sensor for both speeds explains."""
     slip = rows.known("slip")
     if slip.size < 3:
         return
     low, high = float(np.min(slip)), float(np.max(slip))
     largest = max(-low, high)
-    by_speeds = rows.wheel is not None and not rows.channel("slip")
+    by_speeds = rows.wheel is not None and not rows.role("slip")
     alike = by_speeds and _slip_without_cause(1.0 - rows.of("slip"), rows.effort())
-    code, about, text = "slip-unit", ["slip"], ""
-    if alike and largest < _OTHER_RADIUS:  # more is a slip that was set
-        middle = f"{float(np.median(slip)):.2g}"
-        text = f"slip is {middle} in all rows, however much the wheel works: {_COMPUTED}"
-        code, about = "one-sensor", [rows.channel(*TRAVELS), "slip"]
-    elif 0.9 < low < 1.0:
-        text = (
-            f"slip is {low:.2g} or more in all rows: probably the rotation was measured before "
-            "a gearbox, or is in another unit"
-        )
-    elif 0.45 < low < 1.0 and np.ptp(slip) > 0.03:
-        text = (
-            f"slip is {low:.2g} or more in all rows: is the radius given as diameter? (slip "
-            f"would begin at {2.0 * low - 1.0:.2g})"
-        )
-        code = "radius-as-diameter"
-    elif low < -0.3 and high < 0.0:
-        text = (
-            f"slip is below zero in all rows, {low:.2g} at least: are rim and travel speed "
-            "exchanged, or is the radius too small?"
-        )
-        code = "slip-negative"
-    elif largest < _NO_SLIP:
-        code, text = "one-sensor", f"slip is 0 in all rows: {_COMPUTED}"
-    elif largest < 0.01 and not by_speeds:
-        text = "slip is below 0.01 in all rows: was it divided by 100 twice?"
-    if text:
-        yield Hint(code, text, tuple(about), wrong=False)
+    least = f"slip is {low:.2g} or more in all rows"
+    oddities = (
+        (alike and largest < _OTHER_RADIUS, "one-sensor",
+         f"slip is {float(np.median(slip)):.2g} in all rows, however much the wheel works: "
+         f"{_COMPUTED}"),
+        (0.9 < low < 1.0, "slip-unit",
+         f"{least}: probably the rotation was measured before a gearbox, or is in another unit"),
+        (0.45 < low < 1.0 and np.ptp(slip) > 0.03, "radius-as-diameter",
+         f"{least}: is the radius given as diameter? (slip would begin at {2.0 * low - 1.0:.2g})"),
+        (low < -0.3 and high < 0.0, "slip-negative",
+         f"slip is below zero in all rows, {low:.2g} at least: are rim and travel speed "
+         "exchanged, or is the radius too small?"),
+        (largest < _NO_SLIP, "one-sensor", f"slip is 0 in all rows: {_COMPUTED}"),
+        (largest < 0.01 and not by_speeds, "slip-unit",
+         "slip is below 0.01 in all rows: was it divided by 100 twice?"),
+    )  # fmt: skip
+    for applies, code, text in oddities:
+        if applies:
+            travel = rows.role(*TRAVELS) if alike and code == "one-sensor" else ""
+            yield Hint(code, text, tuple(filter(None, (travel, "slip"))), wrong=False)
+            return
 
 
 def _slip_without_cause(ratio: Floats, effort: Floats) -> bool:
@@ -231,13 +203,11 @@ def _slip_without_cause(ratio: Floats, effort: Floats) -> bool:
     return high > _WORKS * low and float(np.std(own)) < _ALIKE / 2.0 * float(np.median(own))
 
 
-def definition_by_speeds(
-    slip: Floats, rim: Floats, travel: Floats, stated: str = SLIP_DEFINITIONS[0]
-) -> tuple[str, str] | None:
-    """Definition and unit ("" or "%") by which slip agrees with the speeds; None for the stated.
+def _definition_by_speeds(slip: Floats, rim: Floats, travel: Floats, stated: str) -> str:
+    """The definition by which slip agrees with the speeds; "" for the stated one.
 
     slip: As 1 - v/(r omega), (rows,), where it was defined as `stated`.
-    rim, travel: Speeds (rows,), m/s, in the sensors' own direction.
+    rim, travel: Speeds (rows,), m/s, in the sensors' own direction; NaN where not known.
 
     The distance of a definition from the speeds is the median over the rows of the difference of
     slip. It replaces the stated one where that is `_LEAST` or more off, and `_BETTER` times as far.
@@ -246,23 +216,17 @@ def definition_by_speeds(
     by_speeds = slip_ratio(direction * rim, direction * travel)
     good = np.isfinite(slip) & np.isfinite(by_speeds) & (np.abs(by_speeds) < 1.0)
     if good.sum() < _FEWEST_ROWS:
-        return None
-    given = _as_logged(slip[good], stated)
-    distance = {
-        (name, unit): float(np.median(np.abs(our_slip(scale * given, name) - by_speeds[good])))
-        for name in SLIP_DEFINITIONS
-        for unit, scale in (("", 1.0), ("%", 0.01))
-    }
-    best = min(distance, key=lambda key: distance[key])
-    off = distance[stated, ""]
-    return best if off > _LEAST and off > _BETTER * distance[best] else None
-
-
-def _as_logged(slip: Floats, definition: str) -> Floats:
-    """The inverse of `our_slip`."""
+        return ""
+    slip, by_speeds = slip[good], by_speeds[good]
     with np.errstate(divide="ignore", invalid="ignore"):
-        if definition == SLIP_DEFINITIONS[1]:
-            return np.where(slip >= 0.0, 1.0 - slip, 1.0 / (1.0 + slip))
-        if definition == SLIP_DEFINITIONS[2]:
-            return np.where(slip > 0.0, slip / (1.0 - slip), slip)
-    return slip
+        given = {
+            _OURS: slip,
+            _RATIO: np.where(slip >= 0.0, 1.0 - slip, 1.0 / (1.0 + slip)),
+            _OF_TYRES: np.where(slip > 0.0, slip / (1.0 - slip), slip),
+        }[stated]
+    distance = {
+        name: float(np.median(np.abs(our_slip(given, name) - by_speeds)))
+        for name in SLIP_DEFINITIONS
+    }
+    best, off = min(distance, key=lambda name: distance[name]), distance[stated]
+    return best if off > _LEAST and off > _BETTER * distance[best] else ""
