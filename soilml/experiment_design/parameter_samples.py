@@ -12,7 +12,6 @@ from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.readings import Readings
 from soilml.identification.averaged import soil_samples
-from soilml.identification.condensing import condensed
 from soilml.identification.posterior import prior_fractions
 
 SAMPLES = 2048  # Default number of samples
@@ -68,7 +67,7 @@ def samples_of_rows(
     With `exact_model`, those of the exact posterior. Raises `FitError` as `identify` does, and
     where noise is not declared.
     """
-    found = soil_samples(case, condensed(case, readings, free), free, exact_model)
+    found = soil_samples(case, readings.thinned(), free, exact_model)
     index, multiplicity = np.unique(found.equally_weighted(count), return_counts=True)
     weights = multiplicity / multiplicity.sum()
     return ParameterSamples(tuple(free), found.sample.u[index], weights, found.noise_scale)

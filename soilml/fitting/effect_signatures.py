@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.errors import InputError, raised
+from soilml.errors import InputError
 from soilml.fitting.candidate_effects import gears_differ, with_effect
-from soilml.fitting.coordinates import Coordinate, size_coordinate
+from soilml.fitting.coordinates import size_coordinate
 from soilml.fitting.levels import covariate_levels
-from soilml.fitting.predictions import PredictionRequest, linearise_many, predict_many
+from soilml.fitting.predictions import linearise, predict
 from soilml.fitting.readings import Readings
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES, FROM_ORDER
-from soilml.physics.sinkage_estimate import SinkageEstimate
 from soilml.remarks import Remark
 
 #: Step of the secant that gives a signature, in reference sizes. A secant is used because some
@@ -43,22 +42,16 @@ def current_size(case: Case, path: str, unit: float) -> float:
 
 
 def effect_signatures(
-    case: Case,
-    readings: Readings,
-    effects: Mapping[str, type[Effect]],
-    estimate: SinkageEstimate | None = None,
+    case: Case, readings: Readings, effects: Mapping[str, type[Effect]]
 ) -> tuple[list[Signature], dict[str, Remark]]:
     """Signatures of the effects that these runs can test, and why they cannot test the others.
 
-    An effect that the case has already is changed from its present size, which may be wrong. The
-    `estimate` (1, n) is that of the sinkage of the case, where it is known.
+    An effect that the case has already is changed from its present size, which may be wrong.
     """
-    no_change = np.zeros((1, 0))
-    base = raised(linearise_many([PredictionRequest(case, [], no_change, readings, estimate)])[0])
-    sinkage = replace(base.sinkage_at(no_change), nearest=True, rough=True)
-    requests = []
+    base = linearise(case, [], np.zeros(0), readings)
+    sinkage = replace(base.sinkage_at(np.zeros((1, 0))), nearest=True, rough=True)
+    signatures: list[Signature] = []
     reasons: dict[str, Remark] = {}
-    changes: dict[str, tuple[Coordinate, float, float]] = {}
     for name, effect in effects.items():
         if reason := _missing_covariate(case, effect, readings):
             reasons[name] = reason
@@ -68,19 +61,14 @@ def effect_signatures(
             changed = with_effect(case, effect)
             at = current_size(changed, size.path, size.reference_size)
             step = SECANT_STEP if size.upper >= at + SECANT_STEP else -SECANT_STEP
+            x = np.asarray([[at + step]])
+            (prediction,) = predict(changed, [size], x, readings, sinkage)
+            if not np.isfinite(prediction).all():  # by the full search
+                (prediction,) = predict(changed, [size], x, readings)
         except InputError as error:
             reasons[name] = Remark("refused", str(error), (name,))
             continue
-        changes[name] = size, at, step
-        x = np.asarray([[at + step]])
-        requests.append(PredictionRequest(changed, [size], x, readings, sinkage))
-    signatures = []
-    predictions = _predicted_near(requests)
-    for (name, (size, at, step)), prediction in zip(changes.items(), predictions, strict=True):
-        if isinstance(prediction, InputError):
-            reasons[name] = Remark("refused", str(prediction), (name,))
-            continue
-        column = (prediction[0] - base.prediction) / step
+        column = (prediction - base.prediction) / step
         if not np.isfinite(column).all():
             text = "with it, the model has no equilibrium in some row"
             reasons[name] = Remark("no-equilibrium", text, (name,))
@@ -88,20 +76,8 @@ def effect_signatures(
             reasons[name] = Remark("no-change", "it changes no measured quantity", (name,))
         else:
             sign = 0 if size.lower < at < size.upper else int(np.sign(step))
-            signatures.append(Signature(name, effects[name].about.kind, column, sign))
-    return signatures, {name: reasons[name] for name in effects if name in reasons}
-
-
-def _predicted_near(requests: Sequence[PredictionRequest]) -> list[Floats | InputError]:
-    """Predictions (1, m) next to the estimates of sinkage; by the full search where these fail."""
-    found = predict_many(requests)
-    again = [
-        i for i, y in enumerate(found) if isinstance(y, InputError) or not np.isfinite(y).all()
-    ]
-    full = predict_many([replace(requests[i], estimate=None) for i in again])
-    for i, y in zip(again, full, strict=True):
-        found[i] = y
-    return found
+            signatures.append(Signature(name, effect.about.kind, column, sign))
+    return signatures, reasons
 
 
 def _missing_covariate(case: Case, effect: type[Effect], readings: Readings) -> Remark | None:

@@ -13,7 +13,7 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate, rates_at, values_at
 from soilml.fitting.covariance import Whitening
-from soilml.fitting.predictions import Linearisation, PredictionRequest, linearise, predict
+from soilml.fitting.predictions import Linearisation, linearise, predict
 from soilml.fitting.readings import Readings
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.sinkage_estimate import SinkageEstimate
@@ -54,23 +54,27 @@ class SoilTestTerms:
 
 @dataclass(frozen=True)
 class PriorTerms:
-    """Deviations from tests of the soil, and from the priors of all coordinates, of unit variance.
+    r"""Deviations of unit variance that stand beside the residuals: of tests and of priors.
 
-    A uniform prior counts as the Gaussian one of its variance about its middle, if at all.
+    .. math:: z_i = (x_i - m_i) / s_i + \theta_i(x_i) / \sigma_i
+
+    for each coordinate, of which one part at most is not zero.
     """
 
     tests: SoilTestTerms
-    normal_std: Floats  # (p,) of normal priors about zero; infinite where uniform
-    uniform_root: Floats  # (p,) root of the precision of uniform ones
+    middle: Floats  # (p,) m of a Gaussian distribution of the coordinate
+    root: Floats  # (p,) 1 / s, root of its precision; 0 where there is none
+    normal_std: Floats  # (p,) sigma of normal priors of the value about zero; infinite without
 
     def deviation(self, x: Floats) -> Floats:
         """Deviations (..., t + p) at coordinates x (..., p)."""
-        own = values_at(self.tests.coordinates, x) / self.normal_std + self.uniform_root * (x - 0.5)
+        of_values = values_at(self.tests.coordinates, x) / self.normal_std
+        own = self.root * (x - self.middle) + of_values
         return np.concatenate([self.tests.deviation(x), own], axis=-1)
 
     def rates(self, x: Floats) -> Floats:
         """Derivatives (t + p, p) of the deviations at coordinates x (p,)."""
-        own = rates_at(self.tests.coordinates, x) / self.normal_std + self.uniform_root
+        own = self.root + rates_at(self.tests.coordinates, x) / self.normal_std
         return np.vstack([self.tests.rates(x), np.diag(own)])
 
 
@@ -97,9 +101,15 @@ class LeastSquaresProblem:
         return SoilTestTerms(self.case, self.coordinates)
 
     @cached_property
-    def precision(self) -> Floats:
-        """Precision of the normal density of each coordinate about zero, (p,)."""
-        return np.asarray([c.std**-2 for c in self.coordinates])
+    def terms(self) -> PriorTerms:
+        """Deviations that stand beside the residuals."""
+        normal_std = np.asarray([c.prior.normal_std or np.inf for c in self.coordinates])
+        if not self.priors:
+            normal_std = np.full(len(normal_std), np.inf)
+        of_size = np.asarray([1.0 / c.std for c in self.coordinates])
+        uniform = (of_size == 0.0) & np.isinf(normal_std) & (self.priors == "all")
+        root = np.where(uniform, np.sqrt(UNIFORM_PRECISION), of_size)
+        return PriorTerms(self.soil_tests, np.where(uniform, 0.5, 0.0), root, normal_std)
 
     @cached_property
     def lower(self) -> Floats:
@@ -111,13 +121,9 @@ class LeastSquaresProblem:
         """Upper bounds of the coordinates, (p,)."""
         return np.asarray([c.upper for c in self.coordinates])
 
-    def request(self, x: Floats, start: SinkageEstimate | None = None) -> PredictionRequest:
-        """The predictions at coordinates x (sets, p), searched from an estimate of the sinkage."""
-        return PredictionRequest(self.case, self.coordinates, x, self.readings, start)
-
-    def predict(self, x: Floats) -> Floats:
-        """Predictions (sets, m) at x (sets, p)."""
-        return predict(self.case, self.coordinates, x, self.readings)
+    def predict(self, x: Floats, start: SinkageEstimate | None = None) -> Floats:
+        """Predictions (sets, m) at x (sets, p), searched from an estimate of the sinkage."""
+        return predict(self.case, self.coordinates, x, self.readings, start)
 
     def residual(self, prediction: Floats) -> Floats:
         """Residuals (..., m) in the units of the readings."""
@@ -133,25 +139,10 @@ class LeastSquaresProblem:
         white = np.asarray((self.whiten @ flat.T).T)
         return white.reshape(*residual.shape[:-1], white.shape[-1])
 
-    @cached_property
-    def normal_std(self) -> Floats:
-        """Standard deviation of each normal prior, (p,); infinite where uniform."""
-        return np.asarray([c.prior.normal_std or np.inf for c in self.coordinates])
-
-    @cached_property
-    def terms(self) -> SoilTestTerms | PriorTerms:
-        """Deviations that stand beside the residuals."""
-        if not self.priors:
-            return self.soil_tests
-        precision = UNIFORM_PRECISION if self.priors == "all" else 0.0
-        root = np.where(np.isinf(self.normal_std), np.sqrt(precision), 0.0)
-        return PriorTerms(self.soil_tests, self.normal_std, root)
-
     def objective(self, residual: Floats, x: Floats) -> Floats:
         """What is minimised, at whitened residuals (..., m) and coordinates (..., p)."""
-        of_prior = (x**2 * self.precision).sum(axis=-1)
         of_terms = (self.terms.deviation(x) ** 2).sum(axis=-1)
-        return np.asarray((residual**2).sum(axis=-1) + of_prior + of_terms)
+        return np.asarray((residual**2).sum(axis=-1) + of_terms)
 
     def at(self, x: Floats, linearisation: Linearisation) -> Solution:
         """The problem at x (p,), from a linearisation there."""
@@ -219,7 +210,7 @@ class Solution:
     @property
     def precision(self) -> Floats:
         """Precision of the normal density of each coordinate about zero, (p,)."""
-        return self.problem.precision
+        return np.asarray([c.std**-2 for c in self.coordinates])
 
     @property
     def soil_tests(self) -> SoilTestTerms:

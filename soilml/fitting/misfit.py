@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -34,55 +34,34 @@ NOISE_ROUNDS = 3
 INITIAL_NOISE = 0.05
 
 
-@dataclass(frozen=True)
-class WeightedRows:
-    """Readings whose noise depends on what is expected of them, and the case that is fitted."""
+def problem_under_noise(
+    case: Case, readings: Readings, free: Sequence[Coordinate], optimum: Solution | None = None
+) -> LeastSquaresProblem:
+    """The problem of readings weighted by their noise, the model discrepancy and shared errors.
 
-    case: Case
-    readings: Readings  # with the standard deviations (m,) that the fit gives them
-    declared: Readings  # as they were declared
-    free: Sequence[Coordinate]
-    shared: Floats  # (m, e) columns of errors that all rows share
-
-    @staticmethod
-    def of(case: Case, readings: Readings, free: Sequence[Coordinate]) -> WeightedRows:
-        """With noise as declared, and shared errors as the soil of the case has them."""
-        std = np.where(np.isfinite(readings.std), readings.std, _initial_noise(readings))
-        shared = _shared(case, readings)
-        return WeightedRows(case, replace(readings, std=std), readings, free, shared)
-
-    @cached_property
-    def columns(self) -> Floats:
-        """Columns (m, q) of the model discrepancy and of errors that all rows share."""
-        own = self.case.discrepancy, Discrepancy(), LEAST_EIGENVALUE, self.case.remainder
-        return np.hstack([discrepancy_process(self.readings, *own).columns, self.shared])
-
-    @cached_property
-    def problem(self) -> LeastSquaresProblem:
-        """The problem, weighted by noise, model discrepancy and shared errors."""
-        whiten = Whitening.of(self.readings.std, self.columns)
-        return LeastSquaresProblem(self.case, self.free, self.readings, whiten, "normal")
-
-    def with_noise_at(self, optimum: Solution) -> WeightedRows:
-        """The same with noise and shared errors at an optimum, or noise from its residuals."""
-        prediction, readings = optimum.prediction, self.declared
-        total = np.hypot(
-            readings.noise_at(prediction),
-            noise_of_operation(self.case, readings, self.free, optimum.x),
-        )
-        residual = optimum.problem.residual(prediction)
-        estimated = _residual_noise(readings, residual, len(self.free))
-        return replace(
-            self,
-            readings=replace(readings, std=np.where(np.isfinite(total), total, estimated)),
-            shared=_shared(optimum.fitted(), readings),
-        )
+    optimum: Where noise and shared errors are; noise that is not declared is then that of its
+        residuals. By default noise is as declared, and the soil that of the case.
+    """
+    if optimum is None:
+        soil, weighted, otherwise = case, readings, _initial_noise(readings)
+    else:
+        soil, weighted = optimum.fitted(), readings.with_noise_at(optimum.prediction)
+        weighted = weighted.with_noise_of_operation(noise_of_operation(soil, readings))
+        residual = optimum.problem.residual(optimum.prediction)
+        otherwise = _residual_noise(readings, residual, len(free))
+    std = np.where(np.isfinite(weighted.std), weighted.std, otherwise)
+    whiten = Whitening.of(std, columns_of_errors(soil, readings))
+    return LeastSquaresProblem(case, free, replace(weighted, std=std), whiten, "normal")
 
 
-def _shared(case: Case, readings: Readings) -> Floats:
+def columns_of_errors(case: Case, readings: Readings) -> Floats:
+    """Columns (m, q) of the model discrepancy of a case, and of errors that all rows share."""
+    own = case.discrepancy, Discrepancy(), LEAST_EIGENVALUE, case.remainder
+    columns = discrepancy_process(readings, *own).columns
     if not readings.shared_errors:
-        return np.zeros((len(readings), 0))
-    return stacked(error_columns(case, readings, readings.shared_errors), len(readings))
+        return columns
+    shared = stacked(error_columns(case, readings, readings.shared_errors), len(readings))
+    return np.hstack([columns, shared])
 
 
 def _initial_noise(readings: Readings) -> Floats:
@@ -126,8 +105,8 @@ class Misfit:
     @staticmethod
     def of(optimum: Solution, readings: Readings, parameters: int) -> Misfit:
         """That of an optimum, of which the first coordinates are the parameters."""
-        squares = optimum.cost + readings.squares_within
-        count = readings.reading_count
+        squares = optimum.cost
+        count = len(readings)
         return Misfit(float(squares), count - parameters, count)
 
     @property
@@ -159,33 +138,30 @@ def misfit_limit(freedom: int) -> float:
 
 def fit_under_declared_noise(
     case: Case, readings: Readings, free: Sequence[Coordinate], start: Floats | None = None
-) -> tuple[WeightedRows, Solution]:
-    """The best fit of p parameters under the declared noise, and the rows as it weights them.
+) -> Solution:
+    """The best fit of p parameters under the declared noise; its problem has the weighted readings.
 
     start (p,): Where it starts, as fractions of the priors; by default the lowest of several
         optima is found.
 
     Raises `FitError` where no parameters in the prior carry the measured loads.
     """
-    weighted = WeightedRows.of(case, readings, free)
-    if start is None:
-        optimum = global_optimum(weighted.problem)
-    else:
-        optimum = descend(weighted.problem, start, FINE)
+    problem = problem_under_noise(case, readings, free)
+    optimum = global_optimum(problem) if start is None else descend(problem, start, FINE)
     for _ in range(NOISE_ROUNDS if readings.undeclared or readings.shared_errors else 1):
-        weighted = weighted.with_noise_at(optimum)
-        optimum = descend(weighted.problem, optimum.x, EXACT, optimum.linearisation)
-    return weighted, optimum
+        problem = problem_under_noise(case, readings, free, optimum)
+        optimum = descend(problem, optimum.x, EXACT, optimum.linearisation)
+    return optimum
 
 
 def declared_misfit(
     case: Case, readings: Readings, free: Sequence[Coordinate], start: Floats | None = None
 ) -> Misfit | None:
     """The misfit of rows of declared noise; None where it is not declared or no fit is possible."""
-    if readings.undeclared or not readings.reading_count:
+    if readings.undeclared or not len(readings):
         return None
     try:
-        _, optimum = fit_under_declared_noise(case, readings, free, start)
+        optimum = fit_under_declared_noise(case, readings, free, start)
     except FitError:
         return None
     return Misfit.of(optimum, readings, len(free))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
+from soilml.errors import FitError
 from soilml.fitting.levels import Levels, load_levels, replicate_rows, slip_levels
 from soilml.fitting.operating_points import gear_numbers, operating_points, operating_points_of_rows
 from soilml.fitting.shared_errors import declared_errors
@@ -27,20 +28,11 @@ Booleans = NDArray[np.bool_]
 #: Standard deviation, as a fraction of a channel's largest reading, up to which it counts as zero:
 #: below any sensor's resolution, and near the rounding errors of a prediction.
 LEAST_RELATIVE_STD = 1e-6
+#: Rows of one fit: the noise of more is far below the errors that rows share, and neighbours in a
+#: log are not independent.
+MOST_FITTED_ROWS = 2000
 #: Smallest standard deviation at a prediction, as a fraction of the channel's median one.
 LEAST_OF_MEDIAN = 1e-3
-
-
-@dataclass(frozen=True)
-class CondensedRows:
-    """What condensed rows stand for."""
-
-    rows: int  # numbers of measured rows, and of their readings
-    readings: int
-    #: Sum of the squared distances of the readings from those of their condensed rows, in standard
-    #: deviations of their noise
-    squares: float
-    undeclared: tuple[str, ...] = ()  # columns whose noise is that of their residuals
 
 
 @dataclass(frozen=True)
@@ -61,13 +53,10 @@ class Readings:
     slip_std: Floats  # (n,) declared noise; 0 where none is declared
     load_std: Floats  # (n,) likewise, N
     sensor_std: Floats | None = None  # (m,) `std` without noise of slip and load, if these are in
-    #: Columns that are not fitted, since their noise is not declared and that of others is
-    excluded_channels: tuple[str, ...] = ()
     notes: tuple[Remark, ...] = ()  # on the table
     #: Standard deviations of the errors that all rows share, by name: as [bias] declares them, or
     #: with those that sensors and models typically have
     shared_errors: Mapping[str, float] = field(default_factory=dict)
-    condensed: CondensedRows | None = None  # what the rows stand for, where many were condensed
 
     @staticmethod
     def of_every_row(
@@ -128,24 +117,12 @@ class Readings:
 
     @property
     def row_count(self) -> int:
-        """Number of measured rows."""
-        return len(self.row_slip) if self.condensed is None else self.condensed.rows
-
-    @property
-    def reading_count(self) -> int:
-        """Number of measured readings."""
-        return len(self) if self.condensed is None else self.condensed.readings
-
-    @property
-    def squares_within(self) -> float:
-        """Squared residuals, in standard deviations, that condensed rows no longer show."""
-        return 0.0 if self.condensed is None else self.condensed.squares
+        """Number of rows."""
+        return len(self.run)
 
     @property
     def undeclared(self) -> tuple[str, ...]:
         """Columns of the channels with a reading whose noise is not declared."""
-        if self.condensed is not None:
-            return self.condensed.undeclared
         unknown = np.unique(self.channel[~np.isfinite(self.std)])
         return tuple(column(self.channels[i]) for i in unknown)
 
@@ -191,8 +168,21 @@ class Readings:
             row=position[part.row],
             slip_std=self.slip_std[rows],
             load_std=self.load_std[rows],
-            condensed=None,
         )
+
+    def thinned(self) -> Readings:
+        """At most `MOST_FITTED_ROWS` rows, one from each of as many stretches of the table."""
+        if self.row_count <= MOST_FITTED_ROWS:
+            return self
+        width = self.row_count / MOST_FITTED_ROWS
+        place = np.random.default_rng(0).random(MOST_FITTED_ROWS)
+        rows = ((np.arange(MOST_FITTED_ROWS) + place) * width).astype(np.int64)
+        text = (
+            f"{MOST_FITTED_ROWS} of {self.row_count} rows are fitted, spread evenly over the table:"
+            " more would tell little beside the errors that all rows share"
+        )
+        notes = (*self.notes, Remark("rows-thinned", text, severity="note"))
+        return replace(self.of_rows(rows)[1], notes=notes)
 
     def subset(self, selected: Booleans) -> Readings:
         """The selected readings; all rows are retained."""
@@ -264,18 +254,18 @@ class Readings:
         """The readings with noise (m,) in addition that their slip and load cause."""
         return replace(self, std=np.hypot(self.std, std), sensor_std=self.std)
 
-    def with_known_noise(self) -> tuple[Readings, list[Remark]]:
-        """The channels with known noise, if there are any, and notes about the excluded ones."""
+    def with_known_noise(self) -> Readings:
+        """The channels with known noise, if there are any, with notes about the others."""
         unknown = self.undeclared
         kept = [i for i, name in enumerate(self.channels) if column(name) not in unknown]
         if not unknown or not kept:
-            return self, []
+            return self
         text = (
-            "{0} is excluded: its noise is not declared and there are no repeated rows to "
-            "estimate it from; declare it in [noise], such as {0} = '3 %'"
+            "{0} is not used: its noise is not declared, nor do repeated rows tell it; declare it "
+            "in [noise], such as {0} = '3 %'"
         )
         notes = [Remark("unused-channel", text.format(key), (key,)) for key in unknown]
-        return self.of_channels(kept), notes
+        return replace(self.of_channels(kept), notes=(*self.notes, *notes))
 
     def with_default_std(self, std: Mapping[str, float]) -> Readings:
         """The readings with these standard deviations, by channel, where none is declared."""
@@ -283,11 +273,13 @@ class Readings:
         return replace(self, std=np.where(np.isfinite(self.std), self.std, default))
 
 
-def stack_readings(case: Case, table: Table) -> Readings:
+def stack_readings(case: Case, table: Table, *, refuse_zeros: bool = False) -> Readings:
     """All finite readings of the channels that the model predicts, with their declared noise.
 
-    Noise is that of `<column>_std`, else of [noise] in the case; a standard deviation that is not
-    positive counts as undeclared. The table has the columns of `with_rover_columns`.
+    Noise is that of `<column>_std`, else of [noise] in the case. A standard deviation of zero,
+    which a relative noise has at a reading of zero, is replaced by the median of the others, with a
+    note. Where all of a channel are zero it counts as undeclared, or raises `FitError` with
+    `refuse_zeros`. The table has the columns of `with_rover_columns`.
     """
     names = tuple(n for n in CHANNELS if column(n) in table and np.isfinite(table[column(n)]).any())
     own_runs = table["run"] if "run" in table else np.zeros(len(table), dtype=np.int64)
@@ -298,12 +290,19 @@ def stack_readings(case: Case, table: Table) -> Readings:
         rows = np.flatnonzero(number == r)
         order[rows[np.argsort(time[rows], kind="stable")]] = np.arange(rows.size)
     found: list[tuple[NDArray[Any], ...]] = [(np.zeros(0),) * 5]
+    notes: list[Remark] = []
     for i, name in enumerate(names):
         key = column(name)
         kept = np.flatnonzero(np.isfinite(table[key]))
-        own = table[f"{key}_std"] if f"{key}_std" in table else np.full(len(table), np.nan)
-        std, from_case = positive_std(case, table, key)[kept], ~np.isfinite(own[kept])
-        found.append((kept, np.full(kept.size, i), table[key][kept], std, from_case))
+        measured = table[key][kept]
+        own = table[f"{key}_std"][kept] if f"{key}_std" in table else np.full(kept.size, np.nan)
+        std = declared_std(case, table, key)[kept]
+        zero = std <= LEAST_RELATIVE_STD * float(np.abs(measured).max())
+        if zero.any():
+            std, note = _without_zeros(std, zero, table, kept, key, refuse_zeros)
+            notes += note
+        from_case = ~np.isfinite(own) & ~zero
+        found.append((kept, np.full(kept.size, i), measured, std, from_case))
     row, channel, measured, std, from_case = map(np.concatenate, zip(*found, strict=True))
     return Readings(
         at=operating_points(table),
@@ -320,7 +319,25 @@ def stack_readings(case: Case, table: Table) -> Readings:
         slip_std=np.nan_to_num(positive_std(case, table, "slip")),
         load_std=np.nan_to_num(positive_std(case, table, "load_N")),
         shared_errors=declared_errors(case),
+        notes=tuple(notes),
     )
+
+
+def _without_zeros(
+    std: Floats, zero: Booleans, table: Table, rows: Integers, key: str, refuse: bool
+) -> tuple[Floats, list[Remark]]:
+    """Standard deviations (m,) with the median of the others where they are zero, and a note."""
+    first = int(np.argmax(zero))
+    found = f"{table.place(int(rows[first]))}, column {key}: standard deviation {std[first]:.3g}"
+    others = std[~zero & np.isfinite(std)]
+    if others.size == 0 and refuse:
+        raise FitError(f"{found}, and no row has a larger one; declare one such as '2 % + 0.05'")
+    if others.size == 0:
+        return np.where(zero, np.nan, std), []
+    median, more = float(np.median(others)), int(zero.sum()) - 1
+    text = f"{found} replaced by the column's median {median:.3g}"
+    text += f"; {more} more rows likewise" if more else ""
+    return np.where(zero, median, std), [Remark("zero-noise", text, (key,))]
 
 
 def declared_std(case: Case, table: Table, key: str) -> Floats:

@@ -12,12 +12,7 @@ from soilml.config.compatibility import check_wheel_size
 from soilml.errors import FitError, InputError, TableError
 from soilml.fitting.faulty_readings import sound_rows
 from soilml.fitting.operating_points import operating_points, with_rover_columns
-from soilml.fitting.readings import (
-    LEAST_RELATIVE_STD,
-    Readings,
-    declared_std,
-    stack_readings,
-)
+from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.row_order import with_order_columns
 from soilml.io.table import Table
 from soilml.physics.gears.emulated import EmulatedGear
@@ -33,9 +28,7 @@ def usable_readings(case: Case, table: Table, *, drifts: bool = True) -> Reading
         case uses it: for drifts among the explanations.
 
     A channel whose noise is not declared is excluded if that of another one is; if none is, all
-    are used and their noise is to be estimated. Rows whose status is not ok are excluded. A
-    standard deviation of zero, which a relative noise has at a reading of zero, is replaced by the
-    median of the others.
+    are used and their noise is to be estimated. Rows whose status is not ok are excluded.
 
     Raises `InputError` where no row remains, `TableError` where the table names another wheel than
     the case's, `FitError` where no reading remains or all standard deviations of one are zero.
@@ -43,16 +36,11 @@ def usable_readings(case: Case, table: Table, *, drifts: bool = True) -> Reading
     table, remarks = prepared_rows(case, table, FROM_ORDER if drifts else None)
     if isinstance(case.model.gear, EmulatedGear):
         check_design(case.model.gear, table)
-    notes = [*remarks, *_remarks_on(case, table)]
-    found = stack_readings(case, table)
+    found = stack_readings(case, table, refuse_zeros=True)
     if not found.channels:
         raise FitError(f"{table.source}: no reading of {', '.join(map(column, CHANNELS))}")
-    found = with_zeros_replaced(case, table, replace(found, notes=tuple(notes)))
-    unknown = found.undeclared
-    kept = [i for i, name in enumerate(found.channels) if column(name) not in unknown]
-    if not kept or not unknown:
-        return found
-    return replace(found.of_channels(kept), excluded_channels=unknown)
+    notes = (*remarks, *_remarks_on(case, table), *found.notes)
+    return replace(found, notes=notes).with_known_noise()
 
 
 def prepared_rows(
@@ -132,41 +120,3 @@ def _grouser_remark(case: Case, table: Table, owner: str) -> list[Remark]:
             text = f"{lugs} is {height:g}, but {owner} has no effect grousers"
             return [Remark("grousers-missing", text, ("grousers",))]
     return []
-
-
-def with_zeros_replaced(
-    case: Case, table: Table, readings: Readings, *, refuse: bool = True
-) -> Readings:
-    """The readings with standard deviations of zero replaced by the median of their channel.
-
-    A channel where all are zero raises `FitError`, or counts as undeclared without `refuse`.
-    """
-    std, replaced, remarks = readings.std.copy(), np.zeros(len(readings), bool), []
-    for i, name in enumerate(readings.channels):
-        key, own = column(name), readings.channel == i
-        declared = declared_std(case, table, key)[readings.row[own]]
-        least = LEAST_RELATIVE_STD * float(np.abs(readings.measured[own]).max())
-        zero = declared <= least
-        if not zero.any():
-            continue
-        first = int(np.argmax(zero))
-        where = f"{table.place(int(readings.row[own][first]))}, column {key}"
-        others = declared[declared > least]
-        if others.size == 0 and not refuse:
-            continue
-        if others.size == 0:
-            raise FitError(
-                f"{where}: standard deviation {declared[first]:.3g}, and no row has a larger one; "
-                "declare one such as '2 % + 0.05'"
-            )
-        median = float(np.median(others))
-        std[own] = np.where(zero, median, declared)
-        replaced[own] = zero
-        more = int(zero.sum()) - 1
-        text = (
-            f"{where}: standard deviation {declared[first]:.3g} replaced by the column's median "
-            f"{median:.3g}{f'; {more} more rows likewise' if more else ''}"
-        )
-        remarks.append(Remark("zero-noise", text, (key,)))
-    notes = (*readings.notes, *remarks)
-    return replace(readings, std=std, from_case=readings.from_case & ~replaced, notes=notes)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.fitting.covariance import noise_of_operation
-from soilml.fitting.damped_descents import descend_together
+from soilml.fitting.damped_descents import descend_each
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
@@ -152,7 +152,7 @@ def predicted_by_refits(
                 problems.append(LeastSquaresProblem(fit.case, fit.coordinates, readings, whiten))
                 starts.append(fit)
                 where.append((i, name, out))
-    found = descend_together(problems, [f.x for f in starts], [f.linearisation for f in starts])
+    found = descend_each(problems, [f.x for f in starts], [f.linearisation for f in starts])
     means = [{name: np.full(len(readings), np.nan) for name in parts} for _ in fits]
     for (i, name, out), solved in zip(where, found, strict=True):
         if not isinstance(solved, InputError):
@@ -218,7 +218,7 @@ def plain_fits(posterior: Posterior, shown: Explanation | None) -> tuple[Solutio
     elsewhere = [np.asarray([c.prior.fraction(c.nominal) for c in soil.coordinates])]
     elsewhere += [np.full(len(soil.x), x) for x in SOIL_STARTS]
     known = [soil.linearisation, *(None for _ in elsewhere)]
-    begun = descend_together([problem(soil)] * len(known), [soil.x, *elsewhere], known)
+    begun = descend_each([problem(soil)] * len(known), [soil.x, *elsewhere], known)
     carried = [
         f for f in begun if not isinstance(f, InputError) and np.isfinite(f.prediction).all()
     ]
@@ -232,7 +232,7 @@ def plain_fits(posterior: Posterior, shown: Explanation | None) -> tuple[Solutio
         for c in shown.fit.coordinates
     ]
     starts = [shown.fit.x, np.asarray(absent)]
-    found = descend_together([own, own], starts, [shown.fit.linearisation, None])
+    found = descend_each([own, own], starts, [shown.fit.linearisation, None])
     solved = [fit for fit in found if not isinstance(fit, InputError)]
     return alone, min([*solved, alone], key=lambda fit: fit.objective)
 

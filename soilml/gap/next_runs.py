@@ -9,16 +9,15 @@ from typing import Any
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.errors import InputError, raised
+from soilml.errors import InputError
 from soilml.fitting.candidate_effects import effect_names
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.covariance import Whitening
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import (
     Linearisation,
-    PredictionRequest,
-    linearise_many,
-    predict_many,
+    linearise,
+    predict,
 )
 from soilml.fitting.readings import Readings
 from soilml.gap.decision import Decision
@@ -144,23 +143,17 @@ def _expected(
 ) -> Iterator[_ExpectedRun]:
     """What the explanations predict for runs; those that they refuse, and repeats, are left out."""
 
-    def request(at: Operating, fit: Solution) -> PredictionRequest:
+    def predicted(at: Operating, fit: Solution) -> Floats:
         rows = Readings.of_every_row(with_default_covariates(at, fit.case), like.channels)
-        return PredictionRequest(fit.case, fit.coordinates, fit.x[None, :], rows)
+        return np.asarray(predict(fit.case, fit.coordinates, fit.x[None, :], rows)[0])
 
-    asked = [(o, {name: _with_gear(fit, o) for name, fit in fits.items()}) for o in options]
-    ways = [[o.at] if o.plain is None else [o.at, o.plain] for o, _ in asked]
-    requests = [
-        [request(at, fit) for at in own for fit in changed.values()]
-        for (_, changed), own in zip(asked, ways, strict=True)
-    ]
-    answers = iter(predict_many([one for own in requests for one in own]))
-    for (option, changed), own in zip(asked, requests, strict=True):
-        found = [next(answers) for _ in own]
-        known = [y for y in found if not isinstance(y, InputError)]
-        if len(known) < len(found):
+    for option in options:
+        changed = {name: _with_gear(fit, option) for name, fit in fits.items()}
+        ways = [option.at] if option.plain is None else [option.at, option.plain]
+        try:
+            y = np.asarray([[predicted(at, fit) for fit in changed.values()] for at in ways])
+        except InputError:
             continue
-        y = np.concatenate(known).reshape(-1, len(changed), known[0].shape[1])
         case = next(iter(changed.values())).case
         readings = readings_like(option.at, like, case, y[0, 0], option.kind)
         if len(y) == 1 or np.any(np.abs(y[0] - y[1]) > SAME_PREDICTION * readings.std):
@@ -171,20 +164,19 @@ def _differences(
     posterior: Posterior, runs: Sequence[_ExpectedRun]
 ) -> Iterator[tuple[_ExpectedRun, list[Difference]]]:
     """How the first explanation differs from the others in each run that none of them refuses."""
-    requests = []
-    for run in runs:
-        for fit in list(run.fits.values())[1:]:
-            rows = replace(run.readings, at=with_default_covariates(run.readings.at, fit.case))
-            requests.append(PredictionRequest(fit.case, fit.coordinates, fit.x[None, :], rows))
-    linear = iter(linearise_many(requests))
+
+    def linearised(run: _ExpectedRun, fit: Solution) -> Linearisation:
+        rows = replace(run.readings, at=with_default_covariates(run.readings.at, fit.case))
+        return linearise(fit.case, fit.coordinates, fit.x, rows)
+
     for run in runs:
         one, *others = run.fits.values()
-        own = [next(linear) for _ in others]
         try:
+            own = [linearised(run, fit) for fit in others]
             columns = scatter_columns(one.fitted(), run.readings)
             terms, at = terms_like(posterior.terms, posterior.noise, run.readings, columns)
             whiten = terms.whiten(at, np.zeros(len(run.readings), bool))
-            yield run, [_difference(whiten, run.predicted[0], raised(line)) for line in own]
+            yield run, [_difference(whiten, run.predicted[0], line) for line in own]
         except (InputError, np.linalg.LinAlgError):
             continue
 

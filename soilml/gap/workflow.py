@@ -16,7 +16,7 @@ from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
 from soilml.fitting.fitted_readings import FittedReadings
 from soilml.fitting.predictions import forces
 from soilml.fitting.readings import Readings, stack_readings
-from soilml.fitting.usable_readings import prepared_rows, with_zeros_replaced
+from soilml.fitting.usable_readings import prepared_rows
 from soilml.gap.cause_of_remainder import described_cause
 from soilml.gap.checks import ONE_LOAD, estimate_repeat_noise, faults_of, naming_obstacles
 from soilml.gap.conclusions import (
@@ -165,10 +165,9 @@ def gap(
     soil = free_soil_parameters(case, free)
 
     readings = stack_readings(case, split.analysed)
-    readings = with_zeros_replaced(case, split.analysed, readings, refuse=False)
     repeat_noise, notes = estimate_repeat_noise(readings)
-    readings, exclusions = readings.with_default_std(repeat_noise).with_known_noise()
-    notes = [*remarks, *notes, *readings.notes, *exclusions]
+    readings = readings.with_default_std(repeat_noise).with_known_noise()
+    notes = [*remarks, *notes, *readings.notes]
     if faults := tuple(faults_of(readings, len(soil))):
         return _bad_data_report(case, faults, notes, seed)
     obstacles = tuple(naming_obstacles(readings, len(soil)))

@@ -15,12 +15,11 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.config.given_case import GivenCase, as_case
 from soilml.config.remainder import SAME_ROWS
-from soilml.errors import FitError, InputError, solvable
+from soilml.errors import InputError, solvable
 from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.fitted_readings import FittedReadings
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification import condensing
 from soilml.identification.averaged import averaged
 from soilml.identification.fit import Fit, disagreeing_soil_tests
 from soilml.identification.linear import linear
@@ -44,9 +43,6 @@ METHODS: dict[str, Method] = {
 }
 #: Methods that need the closed form of a rigid wheel with linear stresses.
 CLOSED_FORM = ("linear", "newton")
-#: Most rows of one fit by a closed form, whose equations are all held at a time. Other methods
-#: condense near replicates, and take any table.
-MOST_ROWS = 100_000
 
 
 @solvable("the identification")
@@ -83,8 +79,7 @@ def identify(
     InputError
         For a method or a parameter that does not exist, or a method that is not for this gear.
     FitError
-        Where the rows do not determine a fit, or are more than `MOST_ROWS` for a closed form; the
-        message states what is missing, or what to do instead.
+        Where the rows do not determine a fit; the message states what is missing.
     TableError
         Where the table names another wheel than the case's.
 
@@ -117,16 +112,9 @@ def identify(
             f"the {method} method is for rigid wheels, not for a {case.model.gear.name}; take "
             "nonlinear"
         )
-    if method in CLOSED_FORM and len(table) > MOST_ROWS:
-        raise FitError(
-            f"{table.source}: {len(table)} rows in one fit; the {method} method takes at most "
-            f"{MOST_ROWS}: take nonlinear, or fit each run by itself"
-        )
     learned, case = case.remainder, case.without_remainder_of(table)
-    readings = usable_readings(case, table, drifts=METHODS[method] is averaged)
+    readings = usable_readings(case, table, drifts=METHODS[method] is averaged).thinned()
     selected = select_free(case, free)
-    if method not in CLOSED_FORM and len(readings.row_slip) > condensing.MOST_ROWS:
-        readings = condensing.condensed(case, readings, selected)
     with threads_for(len(readings)):
         fit = METHODS[method](case, readings, selected)
     if method not in CLOSED_FORM and fit.low is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,9 +14,9 @@ from soilml.fitting.candidate_effects import candidate_effects
 from soilml.fitting.coordinates import Coordinate, values_at
 from soilml.fitting.error_columns import shared_columns
 from soilml.fitting.global_optimum import raise_uncarried
-from soilml.fitting.misfit import Misfit, fit_under_declared_noise, misfit_limit
+from soilml.fitting.misfit import Misfit, fit_under_declared_noise
 from soilml.fitting.readings import Readings
-from soilml.identification.fit import Fit, SoilExplanation, with_warnings
+from soilml.identification.fit import Fit, SoilExplanation
 from soilml.identification.posterior import (
     PosteriorSamples,
     check_declared,
@@ -32,13 +32,6 @@ from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.physics.effects import EFFECTS
 from soilml.physics.effects.base import Effect
 from soilml.remarks import Remark
-
-
-@dataclass(frozen=True)
-class AveragedSamples(PosteriorSamples):
-    """Samples of the soil by all explanations, the likeliest explanation first."""
-
-    explanations: tuple[SoilExplanation, ...] = ()
 
 
 def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
@@ -74,22 +67,12 @@ def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     if case.states_model_error:
         return posterior(case, readings, free)
     found = averaged_samples(case, readings, free)
-    fit, mean_u = fit_of_samples("averaged", found, readings, free)
-    fit = replace(fit, explanations=found.explanations)
+    consequence = "the interval averages over what the model may lack" if found.rejected else ""
+    fit = fit_of_samples("averaged", found, case, readings, free, consequence)
     if sum(one.probability for one in found.explanations if one.exact) < constants.UNLIKELY_MODEL:
         text = "other explanations are a hundred times as likely as the model as in its file"
-        fit = replace(fit, warnings=(*fit.warnings, Remark("unlikely", text)))
-    return with_warnings(
-        fit,
-        case,
-        readings,
-        free,
-        mean_u,
-        excess_residuals="the interval averages over what the model may lack"
-        if found.misfit > misfit_limit(readings.reading_count - len(free))
-        else "",
-        undeclared=bool(readings.undeclared),
-    )
+        fit = replace(fit, warnings=(Remark("unlikely", text), *fit.warnings))
+    return fit
 
 
 def averaged_samples(
@@ -97,12 +80,12 @@ def averaged_samples(
     readings: Readings,
     free: Sequence[Coordinate],
     effects: Mapping[str, type[Effect]] = EFFECTS,
-) -> AveragedSamples:
+) -> PosteriorSamples:
     """Weighted samples of the soil over all explanations of the rows; see `averaged`."""
-    weighted, optimum = fit_under_declared_noise(case, readings, free)
-    misfit = Misfit.of(optimum, readings, len(free)).per_freedom
+    optimum = fit_under_declared_noise(case, readings, free)
+    misfit = Misfit.of(optimum, readings, len(free))
     if readings.undeclared:
-        std = np.where(np.isfinite(readings.std), readings.std, weighted.readings.std)
+        std = np.where(np.isfinite(readings.std), readings.std, optimum.problem.readings.std)
         known = readings.from_case & np.isfinite(readings.std)
         readings = replace(readings, std=std, from_case=known)
     problem = InferenceProblem.of(case, readings, free, candidate_effects(case, effects))
@@ -112,6 +95,8 @@ def averaged_samples(
         raise_uncarried(case, readings.at)
     if found.refused is not None:
         raise_uncarried(case, readings.at)
+    # residuals above the noise may be scatter of the soil from run to run, as `gap` decides too
+    rejected = misfit.exceeds_noise and found.no_gap <= constants.LIKELIER
     fixed, inner = shared_columns(found.soil.fit.fitted(), found.terms.readings, free)
     found = found.beside(fixed, inner)
     u, weights = map(
@@ -119,7 +104,7 @@ def averaged_samples(
     )
     weights = weights if weights.sum() > 0.0 else np.ones_like(weights)
     sample = ImportanceSample(u, weights / weights.sum(), 0.0)
-    return AveragedSamples(sample, misfit, 1.0, _explanations(found))
+    return PosteriorSamples(sample, misfit.per_freedom, rejected, explanations=_explanations(found))
 
 
 def soil_samples(

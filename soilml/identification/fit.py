@@ -276,9 +276,7 @@ def with_warnings(
     readings: Readings,
     free: Sequence[Coordinate],
     u: NDArray[np.float64],
-    *,
     excess_residuals: str,
-    undeclared: bool,
 ) -> Fit:
     """The same fit with its warnings.
 
@@ -301,23 +299,19 @@ def with_warnings(
     if one_load and fraction <= WEAKLY_IDENTIFIED_ABOVE:
         text = "one load only: cohesion is determined by the change with slip alone"
         remarks.append(Remark("one-load", text, ("cohesion",)))
-    if readings.reading_count < len(free):
-        count = "1 reading" if readings.reading_count == 1 else f"{readings.reading_count} readings"
+    if len(readings) < len(free):
+        count = "1 reading" if len(readings) == 1 else f"{len(readings)} readings"
         text = f"{count} for {len(free)} parameters: the prior determines the rest"
         remarks.append(Remark("few-readings", text, fit.names))
     remarks += trade_offs(fit)
     if excess_residuals:
         remarks.append(excess_residuals_remark(float(np.sqrt(fit.misfit)), case, excess_residuals))
-    if undeclared:
-        names = readings.undeclared
+    if names := readings.undeclared:
         text = (
             f"noise of {', '.join(names)} is not declared: estimated from the residuals; declare "
             f'it in [noise] as {names[0]} = "2 %" or in its unit'
         )
         remarks.append(Remark("undeclared-noise", text, names))
-    for name in readings.excluded_channels:
-        text = f"{name} is not used: its noise is not declared in [noise]"
-        remarks.append(Remark("unused-channel", text, (name,)))
     return replace(fit, warnings=(*fit.warnings, *remarks))
 
 

@@ -19,6 +19,7 @@ from soilml.physics.forces import apply_input_effects
 from soilml.physics.gears import LinearWheel
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
+from soilml.quantities import SHEAR
 from soilml.remarks import Remark
 
 ITERATIONS = 50  # Most iterations of the stress at the exit and of the weights
@@ -82,13 +83,12 @@ class _Rows:
 
 def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     rows = _usable_rows(case, readings)
-    declared, freedom = rows.noise_declared, len(rows.slip) - 2
-    if not declared and freedom == 0:
+    declared = rows.noise_declared
+    if not declared and len(rows.slip) == 2:
         raise FitError("two rows leave no residual to estimate the noise: declare it in [noise]")
     solution, matrix, right, weight = _iterate(case, rows)
     residual = (right - matrix @ solution) * weight
-    misfit = float(residual @ residual / freedom) if freedom > 0 else float("nan")
-    noise_variance = misfit if freedom > 0 and (not declared or misfit > 1.0) else 1.0
+    misfit, noise_variance = misfit_and_variance(residual, 2, declared)
     weighted = matrix * weight[:, None]
     normal = weighted.T @ weighted
     if np.linalg.cond(normal) > MOST_CONDITION:
@@ -192,11 +192,7 @@ def _of_rows(readings: Readings, name: str) -> tuple[Floats, Floats]:
 
 def _limits(case: Case, free: Sequence[Coordinate], solution: Floats, load: Floats) -> list[Remark]:
     """What the closed form leaves out, and values outside what soil can have."""
-    remarks = [
-        Remark("not-identified", f"{f.path} is not identified by the linear method", (f.path,))
-        for f in free
-        if f.path not in ("cohesion", "friction_angle", "shear_modulus")
-    ]
+    remarks = not_identified("linear", free, SHEAR)
     if any(effect.overrides("on_stress") for effect in case.model.effects):
         text = "the linear method neglects effects on the stress"
         remarks.append(Remark("effects-neglected", text))
@@ -207,6 +203,26 @@ def _limits(case: Case, free: Sequence[Coordinate], solution: Floats, load: Floa
         text = "one load only: cohesion is not identified"
         remarks.append(Remark("not-identified", text, ("cohesion",)))
     return remarks
+
+
+def misfit_and_variance(residual: Floats, unknowns: int, declared: bool) -> tuple[float, float]:
+    """Mean square of whitened residuals per degree of freedom, and the variance of the noise.
+
+    NaN where no degree is left. The variance is that of the residuals where noise is not declared,
+    or smaller than they say.
+    """
+    freedom = len(residual) - unknowns
+    if freedom < 1:
+        return float("nan"), 1.0
+    misfit = float(residual @ residual / freedom)
+    return misfit, misfit if not declared or misfit > 1.0 else 1.0
+
+
+def not_identified(method: str, free: Sequence[Coordinate], known: Sequence[str]) -> list[Remark]:
+    """That a closed form identifies no parameters other than those it knows."""
+    text = "{} is not identified by the {} method"
+    paths = [f.path for f in free if f.path not in known]
+    return [Remark("not-identified", text.format(path, method), (path,)) for path in paths]
 
 
 def with_fixed_parameter(case: Case, path: str, solve: Callable[[Case], Fit]) -> Fit:

@@ -14,10 +14,13 @@ from soilml.fitting.coordinates import Coordinate, rates_at, values_at
 from soilml.fitting.covariance import Whitening
 from soilml.fitting.damped_descents import EXACT, descend
 from soilml.fitting.least_squares import LeastSquaresProblem
-from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.identification.fit import Fit
-from soilml.identification.linear import with_fixed_parameter
+from soilml.identification.linear import (
+    misfit_and_variance,
+    not_identified,
+    with_fixed_parameter,
+)
 from soilml.numerics.prior import Prior
 from soilml.physics.gears import LinearWheel
 from soilml.physics.soils import Soil
@@ -25,9 +28,6 @@ from soilml.quantities import column
 from soilml.remarks import Remark
 
 LEAST_RATIO = 1e-6  # Least ratio of the singular values of the Jacobian
-#: Step of central differences, as a fraction of the search range: rounding errors of the
-#: equilibrium (1e-10 of a reading) and curvature then both stay below 1e-6 of a derivative.
-DIFFERENCE_STEP = 1e-4
 ASSUMED_NOISE = 0.02  # Noise, as a fraction of the reading, where none is declared
 
 
@@ -63,10 +63,8 @@ def newton(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     law = getattr(gear, "braking", LinearWheel.braking)
     closed = LinearWheel(radius=gear.radius, width=gear.width, braking=law)
     case = replace(case, model=replace(case.model, gear=closed))
-    if readings.reading_count < 3:
-        raise FitError(
-            f"{readings.reading_count} readings: the Newton-Raphson method needs three or more"
-        )
+    if len(readings) < 3:
+        raise FitError(f"{len(readings)} readings: the Newton-Raphson method needs three or more")
     return with_fixed_parameter(case, "cohesion", lambda c: _solve(c, readings, free))
 
 
@@ -87,21 +85,11 @@ def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
             "Newton-Raphson does not converge: the rows do not determine friction angle, shear "
             "modulus and pressure-sinkage modulus together; use --method nonlinear"
         )
-    prediction, jacobian = _central_differences(case, readings, unknowns, u)
-    residual, jacobian = (prediction - measured) / std, jacobian / std[:, None]
-    _check_rank(jacobian)
-    freedom = len(residual) - len(unknowns)
-    misfit = float(residual @ residual / freedom) if freedom > 0 else float("nan")
-    noise_variance = misfit if freedom > 0 and (not known or misfit > 1.0) else 1.0
-    covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14) * noise_variance
+    _check_rank(found.jacobian)
+    misfit, variance = misfit_and_variance(found.residual, len(unknowns), known)
+    inverse = np.linalg.pinv(found.jacobian.T @ found.jacobian, rcond=1e-14)
     values, rate = values_at(unknowns, u), rates_at(unknowns, u)
-    warnings = [
-        Remark(
-            "not-identified", f"{f.path} is not identified by the Newton-Raphson method", (f.path,)
-        )
-        for f in free
-        if f.path not in ("cohesion", *(unknown.path for unknown in unknowns))
-    ]
+    warnings = not_identified("Newton-Raphson", free, ["cohesion", *(f.path for f in unknowns)])
     if not known:
         text = (
             "noise is not declared: estimated from the residuals; in [noise] of the model file "
@@ -113,24 +101,12 @@ def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
         names=tuple(f.path for f in unknowns),
         units=tuple(f.unit for f in unknowns),
         values=values,
-        covariance=np.asarray(covariance, dtype=np.float64) * np.outer(rate, rate),
+        covariance=variance * inverse * np.outer(rate, rate),
         warnings=tuple(warnings),
         rows_used=readings.row_count,
         misfit=misfit if known else float("nan"),
         channels=tuple(column(name) for name in readings.channels),
     )
-
-
-def _central_differences(
-    case: Case, readings: Readings, unknowns: Sequence[Coordinate], u: Floats
-) -> tuple[Floats, Floats]:
-    """Predictions (k,) and Jacobian (k, 3), each set solved for itself.
-
-    The unknowns are nearly dependent, which magnifies errors of first-order derivatives.
-    """
-    sets = np.concatenate([u + DIFFERENCE_STEP * np.eye(3), u - DIFFERENCE_STEP * np.eye(3), [u]])
-    y = predict(case, unknowns, sets, readings)
-    return y[6], np.asarray((y[:3] - y[3:6]).T / (2.0 * DIFFERENCE_STEP))
 
 
 def _unknowns(soil: Soil) -> list[Coordinate]:

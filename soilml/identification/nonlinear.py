@@ -62,15 +62,15 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
     variance).
     """
     undeclared = bool(readings.undeclared)
-    if undeclared and readings.reading_count <= len(free):
+    if undeclared and len(readings) <= len(free):
         raise FitError(
-            f"{readings.reading_count} readings cannot determine {len(free)} parameters and their "
+            f"{len(readings)} readings cannot determine {len(free)} parameters and their "
             "own noise; declare it in [noise]"
         )
-    weighted, optimum = fit_under_declared_noise(case, readings, free)
+    optimum = fit_under_declared_noise(case, readings, free)
     with_prior = optimum
     if np.any(at_prior_bound(optimum.x)):
-        problem = replace(weighted.problem, priors="all")
+        problem = replace(optimum.problem, priors="all")
         with_prior = descend(problem, optimum.x, EXACT, optimum.linearisation)
     x = optimum.x
     found = Misfit.of(optimum, readings, len(free))
@@ -84,7 +84,7 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
         for at in (optimum, with_prior)
     )
     linear_std = np.sqrt(np.diag(linearised))
-    uniform = np.where(np.isinf(optimum.problem.normal_std), of_prior, 0.0)
+    uniform = np.where(np.isinf(optimum.problem.terms.normal_std), of_prior, 0.0)
     to_posterior_mean = linearised @ (uniform * (0.5 - x))
     total = np.maximum(
         np.hypot(linear_std, to_posterior_mean),
@@ -107,12 +107,4 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
         misfit=found.per_freedom if excess or found.freedom > 0 else float("nan"),
         channels=tuple(column(name) for name in readings.channels),
     )
-    return with_warnings(
-        fit,
-        case,
-        readings,
-        free,
-        x,
-        excess_residuals=WIDENED if excess else "",
-        undeclared=undeclared,
-    )
+    return with_warnings(fit, case, readings, free, x, WIDENED if excess else "")

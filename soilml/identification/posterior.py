@@ -11,15 +11,14 @@ import numpy as np
 from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.coordinates import Coordinate, values_at
 from soilml.fitting.covariance import noise_of_operation, squared_residuals_and_log_determinant
 from soilml.fitting.damped_descents import EXACT, descend
 from soilml.fitting.global_optimum import raise_uncarried
-from soilml.fitting.least_squares import SoilTestTerms, Solution
-from soilml.fitting.misfit import Misfit, WeightedRows, fit_under_declared_noise
-from soilml.fitting.predictions import predict
+from soilml.fitting.least_squares import LeastSquaresProblem, SoilTestTerms, Solution
+from soilml.fitting.misfit import Misfit, columns_of_errors, fit_under_declared_noise
 from soilml.fitting.readings import Readings
-from soilml.identification.fit import WIDENED, Fit, with_warnings
+from soilml.identification.fit import WIDENED, Fit, SoilExplanation, with_warnings
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.quantiles import latin_hypercube, systematic_resampling
 from soilml.quantities import column
@@ -44,19 +43,16 @@ CANDIDATES = 64  # Draws of the priors from which one is chosen by the tests of 
 
 @dataclass(frozen=True)
 class PosteriorSamples:
-    """Weighted samples of the posterior, as fractions of the priors, and the best one's misfit."""
+    """Weighted samples of the soil, as fractions of the priors."""
 
     sample: ImportanceSample
-    #: squared residuals over declared variances, per degree of freedom, at the best sample or, with
-    #: shared errors and inflated noise, at the optimum
+    #: Squared residuals of the best fit in variances of the declared noise, per degree of freedom
     misfit: float
-    #: factor on the declared noise: above 1 where the residuals exceed it significantly
-    noise_scale: float
-
-    @property
-    def noise_inflated(self) -> bool:
-        """Whether the residuals exceed the declared noise."""
-        return self.noise_scale > 1.0
+    rejected: bool  # Whether the rows reject the model with all errors that the method knows
+    noise_scale: float = (
+        1.0  # Factor on the declared noise: above 1 where the rows reject the model
+    )
+    explanations: tuple[SoilExplanation, ...] = ()  # That they average over, the likeliest first
 
     def equally_weighted(self, count: int, seed: int = 0) -> Integers:
         """Rows (count,) of the samples, as often as their weights say."""
@@ -108,17 +104,19 @@ def posterior(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
     39(4), 2012, for the sampling.
     """
     found = posterior_samples(case, readings, free)
-    fit, mean_u = fit_of_samples("posterior", found, readings, free)
-    excess = WIDENED if found.noise_inflated else ""
-    return with_warnings(
-        fit, case, readings, free, mean_u, excess_residuals=excess, undeclared=False
-    )
+    excess = WIDENED if found.rejected else ""
+    return fit_of_samples("posterior", found, case, readings, free, excess)
 
 
 def fit_of_samples(
-    method: str, found: PosteriorSamples, readings: Readings, free: Sequence[Coordinate]
-) -> tuple[Fit, Floats]:
-    """Mean, covariance and 90 % interval of samples, and the mean (p,) as fractions of priors."""
+    method: str,
+    found: PosteriorSamples,
+    case: Case,
+    readings: Readings,
+    free: Sequence[Coordinate],
+    excess_residuals: str,
+) -> Fit:
+    """Mean, covariance and 90 % interval of samples, with warnings; see `with_warnings`."""
     sample = found.sample
     values = np.stack([f.prior.at(sample.u[:, i]) for i, f in enumerate(free)], axis=1)
     mean = sample.mean(values)
@@ -143,8 +141,9 @@ def fit_of_samples(
         high=high,
         samples=found,
         draws=values[found.equally_weighted(STORED_DRAWS)],
+        explanations=found.explanations,
     )
-    return fit, mean_u
+    return with_warnings(fit, case, readings, free, mean_u, excess_residuals)
 
 
 def posterior_samples(
@@ -155,44 +154,36 @@ def posterior_samples(
     Raises `FitError` as `posterior` does.
     """
     check_declared(readings)
-    weighted, optimum = fit_under_declared_noise(case, readings, free)
+    optimum = fit_under_declared_noise(case, readings, free)
     found = Misfit.of(optimum, readings, len(free))
     scale = found.factor if found.exceeds_noise else 1.0
-    sample = sample_posterior(case, readings, free, scale, (weighted, optimum))
-    return PosteriorSamples(sample, found.per_freedom, scale)
+    sample = sample_posterior(optimum, scale)
+    return PosteriorSamples(sample, found.per_freedom, found.exceeds_noise, scale)
 
 
-def sample_posterior(
-    case: Case,
-    readings: Readings,
-    free: Sequence[Coordinate],
-    noise_scale: float = 1.0,
-    optimum: tuple[WeightedRows, Solution] | None = None,
-) -> ImportanceSample:
+def sample_posterior(optimum: Solution, noise_scale: float = 1.0) -> ImportanceSample:
     """Weighted fractions of the priors, under the declared noise times a factor.
 
-    optimum: What `fit_under_declared_noise` gives, where it is known.
+    optimum: That of `fit_under_declared_noise`.
 
     Raises `FitError` as `posterior` does.
     """
-    check_declared(readings)
-    weighted, best = optimum or fit_under_declared_noise(case, readings, free)
-    density = PosteriorDensity(weighted, best.x, noise_scale)
-    if readings.reading_count < FEW_READINGS:
-        sample = importance_sample(density, len(free), most_samples=MOST_SAMPLES)
+    problem, p = optimum.problem, len(optimum.x)
+    density = PosteriorDensity(problem, optimum.x, noise_scale)
+    if len(problem.readings) < FEW_READINGS:
+        sample = importance_sample(density, p, most_samples=MOST_SAMPLES)
     else:
-        problem = replace(weighted.problem, priors="all")
-        best = descend(problem, best.x, EXACT, best.linearisation)
+        best = descend(replace(problem, priors="all"), optimum.x, EXACT, optimum.linearisation)
         sample = importance_sample(
             density,
-            len(free),
+            p,
             around=(best.x, WIDER * _normal_root(best, noise_scale)),
             least_effective_size=ENOUGH,
             most_samples=MOST_SAMPLES,
             later=ROUND,
         )
     if not np.isfinite(sample.evidence):
-        raise_uncarried(case, readings.at)
+        raise_uncarried(problem.case, problem.readings.at)
     if sample.effective_size < LEAST_USABLE_SIZE:
         raise FitError(
             f"the effective sample size is {sample.effective_size:.0f}, too small for a mean and a "
@@ -217,36 +208,41 @@ class PosteriorDensity:
     Model discrepancy and errors that all rows share are integrated out, linearised at the optimum;
     so is noise of slip and load.
 
-    weighted: Readings, their covariance, and the case.
+    problem: Readings with the noise that they have at the optimum, and the case.
     optimum (p,): Fractions of the priors at the optimum.
     noise_scale: Factor on all noise: above 1 where residuals exceed all that is declared.
     """
 
-    weighted: WeightedRows
+    problem: LeastSquaresProblem
     optimum: Floats
     noise_scale: float = 1.0
 
     @cached_property
-    def _input_std(self) -> Floats:
-        own = self.weighted
-        return noise_of_operation(own.case, own.declared, own.free, self.optimum)
+    def _linearised(self) -> tuple[Floats, Floats]:
+        """Standard deviation (m,) by noise of slip and load, and columns (m, q) of other errors."""
+        own = self.problem
+        names = [c.path for c in own.coordinates]
+        values = map(float, values_at(own.coordinates, self.optimum))
+        soil = own.case.with_values(dict(zip(names, values, strict=True)))
+        operation = noise_of_operation(soil, own.readings)
+        return operation, columns_of_errors(soil, own.readings)
 
     def __call__(self, u: Floats) -> Floats:
         """Log density (sets,) of parameter sets u (sets, p); -inf without an equilibrium."""
-        size = max(MOST_EVALUATIONS // len(self.weighted.readings.row_slip), 1)
+        size = max(MOST_EVALUATIONS // len(self.problem.readings.row_slip), 1)
         parts = [self._of(u[i : i + size]) for i in range(0, len(u), size)]
         return np.concatenate(parts) if parts else np.zeros(0)
 
     def _of(self, u: Floats) -> Floats:
-        own = self.weighted
-        y = predict(own.case, own.free, u, own.readings)
-        std = np.hypot(own.declared.noise_at(y), self._input_std)
+        own, (operation, columns) = self.problem, self._linearised
+        y = own.predict(u)
+        std = np.hypot(own.readings.noise_at(y), operation)
         squares, log_determinant = squared_residuals_and_log_determinant(
-            y - own.readings.measured, std, own.columns
+            y - own.readings.measured, std, columns
         )
         # the factor on all noise enters the determinant as a constant, which does not matter
         logs = -0.5 * squares / self.noise_scale**2 - log_determinant
-        logs -= 0.5 * (SoilTestTerms(own.case, own.free).deviation(u) ** 2).sum(axis=1)
+        logs -= 0.5 * (own.soil_tests.deviation(u) ** 2).sum(axis=1)
         return np.where(np.isfinite(logs), logs, -np.inf)
 
 

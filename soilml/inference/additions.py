@@ -88,10 +88,9 @@ def _moves(
 
 def _signatures(search: Search, node: Explanation) -> list[Signature]:
     """How the readings change with each effect that may act beside those of a node."""
-    estimate = node.fit.linearisation.sinkage_at(np.zeros((1, len(node.fit.x))))
     others = search.problem.effects_beside(node.hypothesis.effects)
     case, readings = node.fit.fitted(), search.problem.readings
-    found, untestable = effect_signatures(case, readings, others, estimate)
+    found, untestable = effect_signatures(case, readings, others)
     if node.hypothesis == SOIL_ALONE:
         search.untestable = untestable
     search.signatures[node.hypothesis.effects] = found

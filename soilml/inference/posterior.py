@@ -14,7 +14,6 @@ from soilml.fitting.coordinates import values_at
 from soilml.fitting.covariance import Whitening
 from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
-from soilml.fitting.predictions import PredictionRequest, predict_many
 from soilml.inference import constants
 from soilml.inference.draws import DRAWS, Component, Draws, Marginal, marginal, proposals, weighted
 from soilml.inference.explanation import Explanation
@@ -291,20 +290,12 @@ class Posterior:
         proposed = [
             own for one in self.components() for own in proposals(one, self.terms, count, rng)
         ]
-        requests = [
-            PredictionRequest(
-                own.node.fit.case,
-                own.node.fit.coordinates,
-                own.x,
-                self.terms.readings,
-                replace(
-                    own.node.fit.linearisation.sinkage_at(own.x - own.node.fit.x), nearest=True
-                ),
-            )
-            for own in proposed
-        ]
-        predicted = predict_many(requests)
-        return [weighted(o, self.terms, y) for o, y in zip(proposed, predicted, strict=True)]
+        found = []
+        for own in proposed:
+            fit = own.node.fit
+            near = replace(fit.linearisation.sinkage_at(own.x), nearest=True)
+            found.append(weighted(own, self.terms, fit.problem.predict(own.x, near)))
+        return found
 
     def beside(self, fixed: Floats, inner: Sequence[Floats] = ()) -> Posterior:
         """The same hypotheses beside further Gaussian terms; see `Search.beside`."""

@@ -87,7 +87,7 @@ class InferenceProblem:
 
     def checksum(self) -> str:
         """A checksum, within this process, of all that the posterior depends on."""
-        readings = replace(self.readings, notes=(), excluded_channels=())
+        readings = replace(self.readings, notes=())
         effects = sorted((name, id(effect)) for name, effect in self.effects.items())
         parts = (self.case, self.soil, readings, effects, self.calibration)
         return hashlib.sha256(repr(_as_fields(parts)).encode()).hexdigest()

@@ -18,7 +18,7 @@ from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.covariance import noise_of_operation
-from soilml.fitting.damped_descents import COARSE, FINE, Asking, Tolerance, descent, in_step
+from soilml.fitting.damped_descents import COARSE, FINE, Tolerance, descend
 from soilml.fitting.effect_signatures import Signature, current_size
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import Linearisation
@@ -202,8 +202,8 @@ class Search:
     def fit(
         self, jobs: Sequence[StartedFit], tolerance: Tolerance = COARSE
     ) -> list[Solution | InputError]:
-        """Fits that share each call of the model; the error of one that the model refuses."""
-        works = []
+        """The fit of each job; the error of one that the model refuses."""
+        found = []
         for job in jobs:
             coordinates = self.problem.coordinates(job.hypothesis)
             whiten = self.terms.whiten(job.at, job.outliers)
@@ -214,8 +214,8 @@ class Search:
             known = job.near
             if known is not None and len(known.x) != len(coordinates):
                 known = None
-            works.append(_careful(own, np.asarray(first), np.asarray(zero), known, tolerance))
-        return in_step(works)
+            found.append(_careful(own, np.asarray(first), np.asarray(zero), known, tolerance))
+        return found
 
     def _first_size(self, coordinate: Coordinate) -> float:
         """The case's own value of an effect's size, else a size off zero; shapes start at zero."""
@@ -366,12 +366,16 @@ def _careful(
     zero: Floats,
     near: Linearisation | None,
     tolerance: Tolerance,
-) -> Asking[Solution]:
+) -> Solution | InputError:
     """One fit; where the model refuses its trials, again from effects at zero."""
     try:
-        return (yield from descent(problem, first, near, tolerance))
+        return descend(problem, first, tolerance, near)
     except InputError:
-        return (yield from descent(problem, zero, None, tolerance))
+        pass
+    try:
+        return descend(problem, zero, tolerance)
+    except InputError as error:
+        return error
 
 
 def _distance(terms: GaussianTerms, a: Hyperparameters, b: Hyperparameters) -> float:

@@ -9,7 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.numerics.quantiles import effective_size, latin_hypercube, weighted_quantiles
+from soilml.numerics.quantiles import (
+    effective_size,
+    latin_hypercube,
+    systematic_resampling,
+    weighted_quantiles,
+)
 
 #: Samples of the first round, stratified over the cube, and of each round after it.
 FIRST_ROUND, LATER_ROUND = 2048, 2048
@@ -17,18 +22,12 @@ MOST_ROUNDS = 24  # Most adaptive rounds
 #: Effective sample size at which sampling ends: sampling error of a mean is then 1 / sqrt(2500),
 #: 2 % of the standard deviation.
 LEAST_EFFECTIVE_SIZE = 2500.0
-#: Effective sample size that a mixture is fitted to; below it the density is tempered.
+#: Effective sample size that a mixture is made of; below it the density is tempered.
 FITTED_SIZE = 150.0
 BISECTIONS = 30  # Bisections of the tempering exponent
-#: Most components of the mixture, degrees of freedom of their t distributions (four: tails heavy
-#: enough to cover a density that the fit has missed), and the uniform fraction of every proposal.
-COMPONENTS, FREEDOM, UNIFORM = 6, 4.0, 0.1
-EM_STEPS = 12  # Iterations of expectation maximisation
-#: Fraction of the pooled covariance in that of each component, which keeps it regular.
-SHRINKAGE = 0.05
-#: Relative weight below which a sample, and mixing weight below which a component, is left out.
-LEAST_WEIGHT, LEAST_MIXING_WEIGHT = 1e-12, 1e-6
-TINY = 1e-300  # Smallest divisor
+#: Kernels of a mixture, the degrees of freedom of their t distributions (four: tails heavy enough
+#: to cover a density that the mixture has missed), and the uniform fraction of every proposal.
+KERNELS, FREEDOM, UNIFORM = 64, 4.0, 0.1
 
 
 @dataclass(frozen=True)
@@ -64,14 +63,14 @@ def importance_sample(
 ) -> ImportanceSample:
     r"""Weighted samples of a density over the unit cube that is known up to a factor.
 
-    The first round is a Latin hypercube. Each later round is drawn from a mixture of t
-    distributions fitted to all samples so far, a tenth of it uniform, and every sample is weighted
-    by the mean of all rounds' proposals:
+    The first round is a Latin hypercube. Each later round is drawn from a mixture of kernels, t
+    distributions about some of all samples so far, a tenth of it uniform, and every sample is
+    weighted by the mean of all rounds' proposals:
 
     .. math:: w_i \propto \pi(u_i) / \sum_k n_k q_k(u_i)
 
-    While few samples carry the weight, the mixture is fitted to a tempered density, the largest
-    power of it that enough samples share. Consistent for any density, as every proposal covers the
+    While few samples carry the weight, the mixture is that of a tempered density, the largest power
+    of it that enough samples share. Consistent for any density, as every proposal covers the
     cube.
 
     log_density: Logarithm (n,) of the density at points (n, p); -inf where it vanishes.
@@ -85,7 +84,7 @@ def importance_sample(
     later: Samples of each round after the first; fewer suit a density that costs much.
 
     References: Cornuet, Marin, Mira and Robert, Scandinavian J. Statistics 39(4), 2012 (adaptive
-    multiple importance sampling).
+    multiple importance sampling); West, J. R. Statist. Soc. B 55(2), 1993 (mixtures of kernels).
     """
     rng = np.random.default_rng(seed)
     mixtures: list[_Mixture] = []
@@ -93,9 +92,9 @@ def importance_sample(
         u, uniform = latin_hypercube(FIRST_ROUND, p, rng), float(FIRST_ROUND)
     else:
         if isinstance(around, ImportanceSample):
-            mixtures.append(_fit_mixture(around.u, around.weights, rng))
+            mixtures.append(_Mixture.of(around.u, around.weights, rng))
         else:
-            mixtures.append(_Mixture(around[0][None], around[1][None], np.ones(1)))
+            mixtures.append(_Mixture(around[0][None], around[1]))
         u, uniform = _inside(mixtures[0].draw(later, rng)), 0.0
     logs = log_density(u)
     # proposals: sum over rounds of n_k q_k at each sample
@@ -105,7 +104,7 @@ def importance_sample(
         enough = sample.effective_size >= least_effective_size or len(u) >= most_samples
         if enough or not np.isfinite(logs).any():
             break
-        mixture = _fit_mixture(u, _tempered_weights(logs, proposals), rng)
+        mixture = _Mixture.of(u, _tempered_weights(logs, proposals), rng)
         new = _inside(mixture.draw(later, rng))
         earlier = sum((later * m.density(new) for m in mixtures), np.zeros(len(new)))
         at_new = uniform + earlier + later * mixture.density(new)
@@ -152,19 +151,35 @@ def _tempered_weights(logs: Floats, proposals: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class _Mixture:
-    """t distributions: centres (k, p), Cholesky factors (k, p, p) and mixing weights (k,)."""
+    """Equal t distributions: centres (k, p), and the Cholesky factor (p, p) of their scale."""
 
     centres: Floats
-    factors: Floats
-    mixing: Floats
+    factor: Floats
+
+    @staticmethod
+    def of(u: Floats, weights: Floats, rng: np.random.Generator) -> _Mixture:
+        r"""Kernels about some of weighted samples (n, p), with their mean and covariance.
+
+        .. math:: m_j = \bar u + \sqrt{1 - h^2}\,(u_j - \bar u), \quad h = k^{-1 / (p + 4)}
+
+        and the scale h^2 times the covariance: without shrinking the centres, the mixture would be
+        wider than the samples.
+        """
+        p = u.shape[1]
+        mean = weights @ u
+        covariance = ((u - mean).T * weights) @ (u - mean) + 1e-10 * np.eye(p)
+        width = KERNELS ** (-1.0 / (p + 4))
+        chosen = u[systematic_resampling(weights, KERNELS, rng.random())]
+        centres = mean + math.sqrt(1.0 - width**2) * (chosen - mean)
+        return _Mixture(centres, width * np.linalg.cholesky(covariance))
 
     def draw(self, count: int, rng: np.random.Generator) -> Floats:
         """Points (count, p), a fraction `UNIFORM` of them uniform; some lie outside the cube."""
         p = self.centres.shape[1]
-        component = rng.choice(len(self.mixing), count, p=self.mixing)
-        normal = np.einsum("nij,nj->ni", self.factors[component], rng.standard_normal((count, p)))
+        normal = rng.standard_normal((count, p)) @ self.factor.T
         stretch = np.sqrt(FREEDOM / rng.chisquare(FREEDOM, count))
-        from_t = self.centres[component] + normal * stretch[:, None]
+        about = self.centres[rng.integers(len(self.centres), size=count)]
+        from_t = about + normal * stretch[:, None]
         uniform = rng.random(count) < UNIFORM
         return np.where(uniform[:, None], rng.random((count, p)), from_t)
 
@@ -172,64 +187,10 @@ class _Mixture:
         """Density (n,) at points of the cube, uniform fraction included."""
         p = self.centres.shape[1]
         constant = math.lgamma(0.5 * (FREEDOM + p)) - math.lgamma(0.5 * FREEDOM)
-        constant -= 0.5 * p * math.log(FREEDOM * math.pi)
-        total = np.full(len(u), UNIFORM)
-        for centre, factor, share in zip(self.centres, self.factors, self.mixing, strict=True):
-            white = np.linalg.inv(factor) @ (u - centre).T
-            log = constant - np.log(np.diag(factor)).sum()
-            log = log - 0.5 * (FREEDOM + p) * np.log1p((white**2).sum(axis=0) / FREEDOM)
-            total += (1.0 - UNIFORM) * share * np.exp(log)
-        return total
-
-
-def _fit_mixture(u: Floats, weights: Floats, rng: np.random.Generator) -> _Mixture:
-    """A mixture fitted to weighted samples by expectation maximisation, from random centres.
-
-    In p dimensions there are at least p (p + 1) effective samples, twice the entries of a
-    covariance, for each component. Components on a few samples would draw the next ones around
-    these and leave out the tails: in nine dimensions, six of them gave standard deviations that
-    were up to 15 % too small. Scales begin as the pooled covariance over k^(2/p), the volume that
-    one of k components fills.
-    """
-    kept = weights > LEAST_WEIGHT * weights.max()
-    u, weights = u[kept], weights[kept] / weights[kept].sum()
-    n, p = u.shape
-    k = min(COMPONENTS, n, max(int(FITTED_SIZE) // (p * (p + 1)), 1))
-    mean = weights @ u
-    pooled = ((u - mean).T * weights) @ (u - mean) + 1e-10 * np.eye(p)
-    centres = u[rng.choice(n, k, replace=False, p=None if k == n else weights)] if k < n else u
-    scales = np.tile(pooled / k ** (2.0 / p), (k, 1, 1))
-    mixing = np.full(k, 1.0 / k)
-    for _ in range(EM_STEPS):
-        responsibility = _responsibilities(u, weights, centres, scales, mixing)
-        mass = responsibility.sum(axis=1)
-        mixing = mass / mass.sum()
-        centres = (responsibility @ u) / np.maximum(mass, TINY)[:, None]
-        for i in range(k):
-            deviation = u - centres[i]
-            own = (deviation.T * responsibility[i]) @ deviation / max(mass[i], TINY)
-            scales[i] = (1.0 - SHRINKAGE) * own + SHRINKAGE * pooled / k ** (2.0 / p)
-    live = mixing > LEAST_MIXING_WEIGHT
-    return _Mixture(
-        centres[live], np.linalg.cholesky(scales[live]), mixing[live] / mixing[live].sum()
-    )
-
-
-def _responsibilities(
-    u: Floats, weights: Floats, centres: Floats, scales: Floats, mixing: Floats
-) -> Floats:
-    """Weight of each sample that belongs to each component, (k, n)."""
-    joint = np.stack(
-        [
-            share * _gaussian(u, centre, scale)
-            for centre, scale, share in zip(centres, scales, mixing, strict=True)
-        ]
-    )
-    return np.asarray(joint / np.maximum(joint.sum(axis=0), TINY) * weights)
-
-
-def _gaussian(u: Floats, centre: Floats, scale: Floats) -> Floats:
-    """Gaussian density (n,), up to a factor that all components share."""
-    factor = np.linalg.cholesky(scale)
-    white = np.linalg.inv(factor) @ (u - centre).T
-    return np.asarray(np.exp(-0.5 * (white**2).sum(axis=0)) / np.prod(np.diag(factor)))
+        constant -= 0.5 * p * math.log(FREEDOM * math.pi) + np.log(np.diag(self.factor)).sum()
+        white, centres = (np.linalg.solve(self.factor, x.T).T for x in (u, self.centres))
+        squares = np.zeros((len(u), len(centres)))
+        for i in range(p):
+            squares += (white[:, i, None] - centres[:, i]) ** 2
+        of_each = (1.0 + squares / FREEDOM) ** (-0.5 * (FREEDOM + p))
+        return np.asarray(UNIFORM + (1.0 - UNIFORM) * math.exp(constant) * of_each.mean(axis=1))

@@ -17,7 +17,6 @@ from soilml.fitting.mixtures import with_all_effects
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.condensing import condensed
 from soilml.identification.posterior import check_declared, posterior_samples, prior_fractions
 from soilml.inference.constants import INTERVAL_FACTOR
 from soilml.io.table import Table
@@ -141,10 +140,10 @@ def _exact_soil(case: Case, table: Table, free: Sequence[str] | None) -> Measure
     case = one_of(case, "the case")
     unknown, whole = select_free(case, free), usable_readings(case, table)
     check_declared(whole)
-    samples = posterior_samples(case, condensed(case, whole, unknown), unknown)
+    samples = posterior_samples(case, whole.thinned(), unknown)
     x = samples.sample.u[samples.equally_weighted(DRAWS)]
     warnings = [*whole.notes]
-    if samples.noise_inflated:
+    if samples.rejected:
         consequence = "bands are widened and may be biased"
         warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
     residual = np.nan_to_num(whole.measured - predict(case, unknown, x, whole))

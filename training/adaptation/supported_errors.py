@@ -16,7 +16,6 @@ from soilml.fitting.misfit import fit_under_declared_noise, misfit_limit
 from soilml.fitting.readings import Readings
 from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, declared_errors, usual_errors
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.condensing import condensed
 from soilml.inference.conditional import Conditional, conditional
 from soilml.inference.evidence import linear_model, of_priors
 from soilml.inference.gaussian_terms import GaussianTerms
@@ -163,10 +162,10 @@ def _fits(case: Case, rows: Table, scales: Sequence[ErrorScale]) -> list[_ScaleF
     found: list[_ScaleFit | None] = [None] * len(scales)
     try:
         free = select_free(case, None)
-        readings = condensed(case, usable_readings(case, rows), free)
-        weighted, optimum = fit_under_declared_noise(case, readings, free)
+        readings = usable_readings(case, rows).thinned()
+        optimum = fit_under_declared_noise(case, readings, free)
         if readings.undeclared:
-            readings = replace(readings, std=weighted.readings.std)
+            readings = replace(readings, std=optimum.problem.readings.std)
     except (FitError, InputError):
         return found
     for k, scale in enumerate(scales):
@@ -182,11 +181,11 @@ def _fit(
     case: Case, readings: Readings, free: Sequence[Coordinate], start: Floats
 ) -> _ScaleFit | None:
     """The fit beside the shared errors of the readings; None where it leaves a misfit."""
-    weighted, optimum = fit_under_declared_noise(case, readings, free, start)
-    freedom = max(readings.reading_count - len(free), 1)
-    if (optimum.cost + readings.squares_within) / freedom > misfit_limit(freedom):
+    optimum = fit_under_declared_noise(case, readings, free, start)
+    freedom = max(len(readings) - len(free), 1)
+    if optimum.cost / freedom > misfit_limit(freedom):
         return None
-    own = weighted.readings
+    own = optimum.problem.readings
     columns = error_columns(optimum.fitted(), own, readings.shared_errors)
     terms = GaussianTerms.of_columns(own, stacked(columns, len(own)))
     at, kept = terms.first(), np.zeros(len(own), bool)

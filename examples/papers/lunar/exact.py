@@ -8,7 +8,7 @@ from lunar.sweep import Floats, table
 from soilml import Case
 from soilml.fitting.coordinates import select_free
 from soilml.identification import usable_readings
-from soilml.identification.posterior import sample_posterior
+from soilml.identification.posterior import posterior_samples
 
 
 def posterior(
@@ -19,6 +19,6 @@ def posterior(
     Drawn from the weighted samples of `soilml identify --method posterior`.
     """
     free = select_free(case, None)
-    found = sample_posterior(case, usable_readings(case, table(slip, torque, load)), free)
+    found = posterior_samples(case, usable_readings(case, table(slip, torque, load)), free).sample
     drawn = found.u[rng.choice(len(found.u), count, p=found.weights)]
     return np.stack([f.prior.at(drawn[:, k]) for k, f in enumerate(free)], axis=1)

@@ -7,18 +7,18 @@ scatter about it, and not the number of samples, gives the uncertainty.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from soilml.arrays import Floats
 from soilml.identification.bevameter.scatter import (
+    LawDraws,
     SpreadEstimate,
     TestLine,
     distinct_levels,
     relative_line,
-    spread_estimate,
 )
 from soilml.identification.bevameter.tables import StressCurve
 from soilml.parameters import declared
@@ -67,10 +67,7 @@ class PressureSinkageFit:
     curves: tuple[PlateCurve, ...]  # the law fitted to each
     depth: float  # z_0 (m), where pressure and exponent are least correlated
     sizes: tuple[float, ...]  # distinct sizes b of the plates, m
-    pressure: Floats  # A (Pa) and B (Pa m) at the reference depth; B is 0 where there is one size
-    exponent: float  # n
-    mean_draws: Floats  # (draws, 3) of A, B and n: of the mean
-    place_draws: Floats  # and of another place of the soil
+    draws: LawDraws  # of A (Pa), B (Pa m; 0 where there is one size), and n
 
     @property
     def several_sizes(self) -> bool:
@@ -80,30 +77,27 @@ class PressureSinkageFit:
     @property
     def moduli(self) -> tuple[float, float]:
         """Estimates of kc and kphi; kc is 0 where there is one size."""
-        scale = self.depth**-self.exponent
-        return float(self.pressure[1] * scale), float(self.pressure[0] * scale)
+        pressure, by_size, exponent = map(float, self.draws.value)
+        scale = self.depth**-exponent
+        return by_size * scale, pressure * scale
 
     def modulus(self, width: float) -> SpreadEstimate:
         """kc / b + kphi for a width b (m)."""
         z = self.depth
-        return self._estimate("N/m^(n+2)", lambda d: (d[0] + d[1] / width) * z ** -d[2])
+        return self.draws.estimate(lambda d: (d[0] + d[1] / width) * z ** -d[2], "N/m^(n+2)")
 
     def pressure_at_depth(self, size: float) -> SpreadEstimate:
         """Pressure at the reference depth under a plate of a size (m)."""
-        return self._estimate("Pa", lambda d: d[0] + d[1] / size)
+        return self.draws.estimate(lambda d: d[0] + d[1] / size, "Pa")
 
     def estimates(self) -> dict[str, SpreadEstimate]:
         """What the tests determine: n, and kc with kphi, or k for the one width tested."""
-        z, found = self.depth, {"n": self._estimate("1", lambda d: d[2])}
+        z, found = self.depth, {"n": self.draws.estimate(lambda d: d[2], "1")}
         if not self.several_sizes:
             return found | {"k": self.modulus(self.sizes[0])}
-        found["kc"] = self._estimate("N/m^(n+1)", lambda d: d[1] * z ** -d[2])
-        found["kphi"] = self._estimate("N/m^(n+2)", lambda d: d[0] * z ** -d[2])
+        found["kc"] = self.draws.estimate(lambda d: d[1] * z ** -d[2], "N/m^(n+1)")
+        found["kphi"] = self.draws.estimate(lambda d: d[0] * z ** -d[2], "N/m^(n+2)")
         return found
-
-    def _estimate(self, unit: str, of: Callable[[Floats], Floats]) -> SpreadEstimate:
-        value = float(of(np.append(self.pressure, self.exponent)))
-        return spread_estimate(value, of(self.mean_draws.T), of(self.place_draws.T), unit)
 
 
 def fit_pressure_sinkage(tests: Sequence[StressCurve]) -> PressureSinkageFit:
@@ -144,8 +138,9 @@ def fit_pressure_sinkage(tests: Sequence[StressCurve]) -> PressureSinkageFit:
     place[:, 2] += line.deviation[:, 1]
     for draws in (mean, place):
         draws[:, 2] = np.maximum(draws[:, 2], declared(Soil)["n"].lower)
-    full = np.append(line.coefficients, np.zeros(2 - p))
-    return PressureSinkageFit(tuple(tests), curves, depth, sizes, full, exponent, mean, place)
+    value = np.asarray([*line.coefficients, *np.zeros(2 - p), exponent])
+    law_draws = LawDraws(value, mean.T, place.T)
+    return PressureSinkageFit(tuple(tests), curves, depth, sizes, law_draws)
 
 
 def _fit_plate_curve(test: StressCurve, depth: float) -> PlateCurve:
@@ -187,20 +182,41 @@ class ShearFit:
     tests: tuple[StressCurve, ...]
     curves: tuple[ShearCurve, ...]  # fitted to each
     stresses: tuple[float, ...]  # distinct normal stresses, Pa
-    cohesion: SpreadEstimate | None  # Pa; None where there is one normal stress
-    friction_angle: SpreadEstimate | None  # rad; likewise
-    strength: SpreadEstimate  # at the mean normal stress, Pa
-    shear_modulus: SpreadEstimate | None  # geometric mean, m; None where none has a curve
+    draws: LawDraws  # of c (Pa; 0 where there is one normal stress), tan phi, and K (m)
     #: (c, phi) of the lighter and of the heavier half of the loads where the failure line is
     #: curved; else empty
     halves: tuple[tuple[float, float], ...]
 
+    @property
+    def several_stresses(self) -> bool:
+        """Whether cohesion and friction are told apart."""
+        return self.stresses[-1] >= LEAST_STRESS_RATIO * self.stresses[0]
+
+    @property
+    def strength(self) -> SpreadEstimate:
+        """The strength at the mean normal stress."""
+        middle = float(np.mean([test.level for test in self.tests]))
+        return self.draws.estimate(lambda d: d[0] + middle * d[1], "Pa")
+
+    @property
+    def shear_modulus(self) -> SpreadEstimate | None:
+        """The geometric mean of K; None where no test has a curve."""
+        measured = any(test.has_curve for test in self.tests)
+        return self.draws.estimate(lambda d: d[2], "m") if measured else None
+
     def estimates(self) -> dict[str, SpreadEstimate]:
         """What the tests determine, by name."""
-        found = {} if self.shear_modulus is None else {"shear_modulus": self.shear_modulus}
-        if self.cohesion is None or self.friction_angle is None:
+        modulus = self.shear_modulus
+        found = {} if modulus is None else {"shear_modulus": modulus}
+        if not self.several_stresses:
             return {"shear_strength": self.strength, **found}
-        return {"cohesion": self.cohesion, "friction_angle": self.friction_angle, **found}
+        c = self.draws.estimate(
+            lambda d: np.maximum(d[0], 0.0), "Pa", [max(half[0], 0.0) for half in self.halves]
+        )
+        phi = self.draws.estimate(
+            lambda d: np.arctan(np.maximum(d[1], 0.0)), "rad", [half[1] for half in self.halves]
+        )
+        return {"cohesion": c, "friction_angle": phi, **found}
 
 
 def fit_shear_strength(tests: Sequence[StressCurve]) -> ShearFit:
@@ -224,25 +240,14 @@ def fit_shear_strength(tests: Sequence[StressCurve]) -> ShearFit:
     columns = columns[:, int(stresses[-1] < LEAST_STRESS_RATIO * stresses[0]) :]
     line = TestLine.of(columns, strength, log_modulus, SHEAR_SCATTER, above_zero=True)
     p = len(line.coefficients)
-    draws = line.coefficients + line.error[:, :p]
-    draws *= _shape_factors(curves, len(draws))[:, None]
-    other = draws * np.exp(line.deviation[:, :1])
-    middle = float(sigma.mean())
-    at = np.asarray([1.0, middle])[-p:]
+    mean = np.zeros((len(line.error), 3))
+    mean[:, 2 - p : 2] = line.coefficients + line.error[:, :p]
+    mean[:, :2] *= _shape_factors(curves, len(mean))[:, None]
+    mean[:, 2] = np.exp(line.mean + line.error[:, p])
+    place = mean * np.exp(line.deviation[:, [0, 0, 1]])
+    value = np.asarray([*np.zeros(2 - p), *line.coefficients, np.exp(line.mean)])
     halves = _halves(sigma, strength) if len(stresses) >= LEAST_LOADS else ()
-    c = phi = k = None
-    if p == 2:
-        value, mean, place = (np.maximum(d, 0.0).T for d in (line.coefficients, draws, other))
-        also = [max(half[0], 0.0) for half in halves]
-        c = spread_estimate(float(value[0]), mean[0], place[0], "Pa", also)
-        value, mean, place = (np.arctan(d[1]) for d in (value, mean, place))
-        phi = spread_estimate(float(value), mean, place, "rad", [half[1] for half in halves])
-    if np.isfinite(log_modulus).any():
-        modulus = np.exp(line.mean + line.error[:, p])
-        elsewhere = modulus * np.exp(line.deviation[:, 1])
-        k = spread_estimate(float(np.exp(line.mean)), modulus, elsewhere, "m")
-    total = spread_estimate(float(line.coefficients @ at), draws @ at, other @ at, "Pa")
-    return ShearFit(tuple(tests), curves, stresses, c, phi, total, k, halves)
+    return ShearFit(tuple(tests), curves, stresses, LawDraws(value, mean.T, place.T), halves)
 
 
 def fit_shear_curve(test: StressCurve) -> ShearCurve:

@@ -7,9 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.identification.bevameter.laws import PressureSinkageFit, ShearFit
-from soilml.identification.bevameter.scatter import is_level
 from soilml.remarks import Remark
 
 #: Change of the exponent between the shallower and the deeper half of a curve from which the law is
@@ -62,12 +60,9 @@ def plate_remarks(fit: PressureSinkageFit) -> Iterator[Remark]:
             "kc is below zero: larger plates carry more pressure; do not use it for widths below "
         )
         yield Remark("below-zero", f"{text}{fit.sizes[0]:.3g} m", ("kc",))
-    yield from _repeats(
-        np.asarray([test.level for test in fit.tests]),
-        np.exp([curve.log_pressure for curve in fit.curves]),
-        [(b, f"with the plate of {b:.3g} m", f"pressure at {fit.depth:.3g} m") for b in fit.sizes],
-        "no plate test was repeated: a usual scatter of 15 % in pressure is assumed",
-    )
+    if len(fit.tests) == len(fit.sizes):
+        text = "no plate test was repeated: a usual scatter of 15 % in pressure is assumed"
+        yield Remark("not-repeated", text)
     halves = np.asarray([c.halves for c in fit.curves if np.isfinite(c.halves).all()])
     if halves.size and abs(np.diff(halves.mean(axis=0))[0]) > NOTABLE_BEND:
         shallow, deep = halves.mean(axis=0)
@@ -83,23 +78,6 @@ def plate_remarks(fit: PressureSinkageFit) -> Iterator[Remark]:
         yield Remark("samples-omitted", text, severity="note")
 
 
-def _repeats(
-    at: Floats, value: Floats, levels: Sequence[tuple[float, str, str]], otherwise: str
-) -> Iterator[Remark]:
-    """How far tests (n,) of one level differ in a value (n,); `otherwise` where none is repeated.
-
-    levels: Each with what its tests have in common, and what they differ in, in words.
-    """
-    for level, where, what in levels:
-        near = value[is_level(at, level)]
-        if near.size > 1:
-            factor = near.max() / near.min()
-            text = f"{near.size} tests {where} differ by a factor {factor:.2f} in {what}"
-            yield Remark("repeats-differ", text, severity="note")
-    if at.size == len(levels):
-        yield Remark("not-repeated", otherwise)
-
-
 def shear_remarks(fit: ShearFit) -> Iterator[Remark]:
     """Remarks on shear tests."""
     pairs = list(zip(fit.tests, fit.curves, strict=True))
@@ -108,35 +86,32 @@ def shear_remarks(fit: ShearFit) -> Iterator[Remark]:
     if ratio > ODD_RATIO:
         text = f"the shear strength is {ratio:.3g} times the normal stress: check that both are "
         yield Remark("doubtful-unit", f"{text}in Pa", stresses)
-    if fit.shear_modulus is None:
+    found = fit.estimates()
+    if "shear_modulus" not in found:
         text = "the tests have strengths alone, no stress over displacement: K is not measured"
         yield Remark("not-measured", text, ("shear_modulus",))
-    if fit.cohesion is None:
+    elif found["shear_modulus"].value > ODD_MODULUS:
+        text = f"K is {1e3 * found['shear_modulus'].value:.3g} mm, more than that of any soil: "
+        text += "check the unit of the shear displacement"
+        yield Remark("doubtful-unit", text, ("shear_displacement_m",))
+    if "cohesion" not in found:
         text = (
             f"one normal stress ({_kpa(fit.stresses[0])} kPa): cohesion and friction angle are "
             f"not identifiable, only c + sigma tan(phi) = {_kpa(fit.strength.value)} kPa there"
         )
         yield Remark("one-normal-stress", text, ("cohesion", "friction_angle"))
-    elif fit.cohesion.value == 0.0:
+    elif found["cohesion"].value == 0.0:
         text = "the failure line meets the axis below zero: cohesion is set to zero"
         yield Remark("below-zero", text, ("cohesion",))
-    elif fit.cohesion.value > ODD_COHESION:
-        text = f"the cohesion is {_kpa(fit.cohesion.value)} kPa, more than that of any soil: check "
-        yield Remark("doubtful-unit", f"{text}the unit of the stresses", stresses)
-    if fit.shear_modulus is not None and fit.shear_modulus.value > ODD_MODULUS:
+    elif found["cohesion"].value > ODD_COHESION:
+        text = f"the cohesion is {_kpa(found['cohesion'].value)} kPa, more than that of any soil: "
+        yield Remark("doubtful-unit", f"{text}check the unit of the stresses", stresses)
+    if len(fit.tests) == len(fit.stresses):
         text = (
-            f"K is {1e3 * fit.shear_modulus.value:.3g} mm, more than that of any soil: check the "
+            "no shear test was repeated: the scatter is that of the tests about the line, and a "
+            "usual one of 8 % in strength"
         )
-        yield Remark(
-            "doubtful-unit", f"{text}unit of the shear displacement", ("shear_displacement_m",)
-        )
-    yield from _repeats(
-        np.asarray([test.level for test in fit.tests]),
-        np.asarray([curve.strength for curve in fit.curves]),
-        [(sigma, f"at {_kpa(sigma)} kPa", "strength") for sigma in fit.stresses],
-        "no shear test was repeated: the scatter is that of the tests about the line, and a usual "
-        "one of 8 % in strength",
-    )
+        yield Remark("not-repeated", text)
     if fit.halves:
         low, high = (
             f"{_kpa(c)} kPa and phi = {math.degrees(phi):.1f} deg" for c, phi in fit.halves

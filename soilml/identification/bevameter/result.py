@@ -169,7 +169,7 @@ def _draw_plates(panel: Any, fit: PressureSinkageFit) -> None:
         panel.loglog(1e3 * test.x, 1e-3 * own, color=dots.get_color(), linewidth=0.8)
     depth = np.geomspace(min(t.x[0] for t in fit.tests), max(t.x[-1] for t in fit.tests))
     for size in fit.sizes:
-        law = (kc / size + kphi) * depth**fit.exponent
+        law = (kc / size + kphi) * depth ** fit.draws.value[2]
         panel.loglog(1e3 * depth, 1e-3 * law, color="black", linewidth=2.0, alpha=0.6)
     panel.set_xlabel("sinkage, mm")
     panel.set_ylabel("pressure, kPa")
@@ -196,9 +196,9 @@ def _draw_strengths(panel: Any, fit: ShearFit) -> None:
     sigma = np.asarray([test.level for test in fit.tests])
     strength = np.asarray([curve.strength for curve in fit.curves])
     panel.plot(1e-3 * sigma, 1e-3 * strength, "o", label="strength of each test")
-    if fit.cohesion is not None and fit.friction_angle is not None:
+    if fit.several_stresses:
         grid = np.linspace(0.0, 1.05 * float(sigma.max()), 50)
-        line = fit.cohesion.value + grid * np.tan(fit.friction_angle.value)
+        line = fit.draws.value[0] + grid * fit.draws.value[1]
         panel.plot(1e-3 * grid, 1e-3 * line, color="black", linewidth=2.0, alpha=0.6)
     panel.set_xlim(left=0.0)
     panel.set_ylim(bottom=0.0)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 
@@ -40,18 +39,23 @@ class SpreadEstimate:
         return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
 
 
-def spread_estimate(
-    value: float, mean: Floats, place: Floats, unit: str, also: Sequence[float] = ()
-) -> SpreadEstimate:
-    """The estimate with the ranges of draws of the mean and of another place, (draws,) each.
+@dataclass(frozen=True)
+class LawDraws:
+    """The q coefficients of a law, and draws of them (q, draws): of the mean, of another place."""
 
-    also: Values that both ranges contain too.
-    """
-    ends = (np.quantile(own, [0.025, 0.975]) for own in (mean, place))
-    first, second = (
-        (float(min(low, *also, low)), float(max(high, *also, high))) for low, high in ends
-    )
-    return SpreadEstimate(value, first, second, unit)
+    value: Floats
+    mean: Floats
+    place: Floats
+
+    def estimate(
+        self, of: Callable[[Floats], Floats], unit: str, also: Sequence[float] = ()
+    ) -> SpreadEstimate:
+        """A function of the coefficients (q, ...) with its ranges; both contain `also` too."""
+        ends = (np.quantile(of(own), [0.025, 0.975]) for own in (self.mean, self.place))
+        first, second = (
+            (float(min(low, *also, low)), float(max(high, *also, high))) for low, high in ends
+        )
+        return SpreadEstimate(float(of(self.value)), first, second, unit)
 
 
 def distinct_levels(values: Floats) -> tuple[float, ...]:
@@ -59,11 +63,6 @@ def distinct_levels(values: Floats) -> tuple[float, ...]:
     ordered = np.sort(values)
     groups = np.split(ordered, np.flatnonzero(ordered[1:] > SAME_LEVEL * ordered[:-1]) + 1)
     return tuple(float(group.mean()) for group in groups)
-
-
-def is_level(values: Floats, level: float) -> NDArray[np.bool_]:
-    """Which values belong to a level, (k,)."""
-    return np.asarray(np.maximum(values / level, level / values) < SAME_LEVEL)
 
 
 def relative_line(columns: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:

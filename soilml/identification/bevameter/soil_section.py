@@ -43,8 +43,9 @@ def plate_section(fit: PressureSinkageFit, case: Case | None) -> Section:
     limits kphi = 0 and kc = 0 it is k times the ratio of the widths, and k itself.
     """
     kc, kphi = fit.moduli
-    values = {"kc": kc, "kphi": kphi, "n": fit.exponent}
-    prior = {"n": _prior("n", fit.exponent, fit.estimates()["n"].another_place_95)}
+    exponent = fit.estimates()["n"]
+    values = {"kc": kc, "kphi": kphi, "n": exponent.value}
+    prior = {"n": _prior("n", exponent.value, exponent.another_place_95)}
     widths = widths_of_gears(case)
     remarks: list[Remark] = []
     if len(widths) > 1 and fit.several_sizes:
@@ -84,16 +85,11 @@ def shear_section(fit: ShearFit, case: Case | None) -> Section:
     the value and the prior of the case, or is anything up to the strength, and the friction angle
     is what each cohesion leaves.
     """
-    modulus = fit.shear_modulus
-    values: dict[str, float] = {}
-    prior: dict[str, Prior] = {}
-    if modulus is not None:
-        values["shear_modulus"] = modulus.value
-        prior["shear_modulus"] = _prior("shear_modulus", modulus.value, modulus.another_place_95)
-    if fit.cohesion is not None and fit.friction_angle is not None:
-        for name, estimate in (("cohesion", fit.cohesion), ("friction_angle", fit.friction_angle)):
-            values[name] = estimate.value
-            prior[name] = _prior(name, estimate.value, estimate.another_place_95)
+    found = fit.estimates()
+    known = {name: own for name, own in found.items() if name != "shear_strength"}
+    values = {name: own.value for name, own in known.items()}
+    prior = {n: _prior(n, own.value, own.another_place_95) for n, own in known.items()}
+    if fit.several_stresses:
         return values, prior, []
     sigma, (low, high) = fit.stresses[0], fit.strength.another_place_95
     own = case.prior.get("cohesion") if case is not None else None

@@ -4,15 +4,8 @@ import numpy as np
 import pytest
 from gap_sets import MODEL, case_of, driven
 
-from soilml.errors import InputError
-from soilml.fitting import damped_descents
 from soilml.fitting.coordinates import select_free
-from soilml.fitting.damped_descents import (
-    bounded_steps,
-    descend,
-    descend_together,
-    in_step,
-)
+from soilml.fitting.damped_descents import bounded_step, descend, descend_each
 from soilml.fitting.least_squares import LeastSquaresProblem
 from soilml.fitting.readings import stack_readings
 
@@ -41,11 +34,8 @@ def test_a_step_that_meets_a_bound_goes_on_in_the_valley():
     """Along the valley u = v the minimum lies at 5; where u ends at 1, v ends nearby."""
     normal = np.asarray([[1.0, -0.99], [-0.99, 1.0]])
     descent = normal @ np.asarray([5.0, 5.0])
-    free, low = np.asarray([[True, True], [False, True], [True, True]]), np.full((3, 2), -1.0)
-    high = np.asarray([[1.0, 3.0], [1.0, 1.0], [9.0, 9.0]])
-    met, held, within = bounded_steps(
-        *(np.stack([a] * 3) for a in (normal, descent)), free, low, high
-    )
+    low, high = np.full(2, -1.0), ((1.0, 9.0), (0.0, 9.0), (9.0, 9.0))
+    met, held, within = (bounded_step(normal, descent, low, np.asarray(h)) for h in high)
     assert met == pytest.approx([1.0, 5.0 - 0.99 * 4.0])
     assert held == pytest.approx([0.0, descent[1]])
     assert within == pytest.approx([5.0, 5.0])
@@ -55,34 +45,8 @@ def test_a_start_with_a_known_linearisation_leads_to_the_same_fit():
     own = of_soil(case_of(), driven(case_of(), seed=2))
     start = np.full(3, 0.3)
     known = own.linearised(start).linearisation
-    alone, beside, elsewhere = descend_together(
+    alone, beside, elsewhere = descend_each(
         [own] * 3, [start, start, np.full(3, 0.6)], [None, known, known]
     )
     assert np.array_equal(alone.x, beside.x) and alone.objective == beside.objective
     assert elsewhere.x == pytest.approx(alone.x, abs=2e-3)
-
-
-def test_works_share_calls_and_a_refusal_is_raised_where_it_was_asked(monkeypatch):
-    calls = []
-
-    def answers(asked):
-        calls.append(list(asked))
-        return {i: InputError("no") if q == "refused" else q for i, q in asked.items()}
-
-    def work(*questions, caught=False):
-        found = []
-        for question in questions:
-            try:
-                found.append((yield question))
-            except InputError:
-                if not caught:
-                    raise
-                found.append("caught")
-        return found
-
-    monkeypatch.setattr(damped_descents, "_answers", answers)
-    works = [work("a"), work("b", "refused", "c", caught=True), work("refused", "d"), work()]
-    one, two, three, four = in_step(works)
-    assert (one, two, four) == (["a"], ["b", "caught", "c"], [])
-    assert isinstance(three, InputError)
-    assert calls == [[0, 1, 2], [1], [1]]

@@ -37,9 +37,12 @@ def test_a_table_without_a_reading_has_none():
     assert found.slip_std.tolist() == found.load_std.tolist() == [0.0] * 5
 
 
-def test_noise_that_is_not_positive_is_not_declared():
+def test_noise_that_is_not_positive_is_the_median_of_the_others():
     found = stacked()
-    assert found.std[:4] == pytest.approx([0.1, np.nan, np.nan, 0.5], nan_ok=True)
+    assert found.std[:4] == pytest.approx([0.1, 0.3, 0.3, 0.5])
+    assert [note.code for note in found.notes] == ["zero-noise"]
+    none = stacked(replace(SMALL, columns=SMALL.columns | {"torque_Nm_std": np.zeros(5)}))
+    assert none.undeclared == ("torque_Nm",) and not none.notes
     noise = case_of().noise
     assert found.noise == (noise["torque_Nm"], noise["sinkage_m"])
     assert found.std[4:] == pytest.approx(noise["sinkage_m"].std(found.measured[4:]))
@@ -50,8 +53,8 @@ def test_noise_that_is_not_positive_is_not_declared():
     elsewhere = found.noise_at(2.0 * found.measured)
     assert elsewhere[:4] == pytest.approx(found.std[:4], nan_ok=True)
     assert elsewhere[4:] == pytest.approx(noise["sinkage_m"].std(2.0 * found.measured[4:]))
-    usual = found.with_default_std({"torque": 0.7})
-    assert usual.std[:4] == pytest.approx([0.1, 0.7, 0.7, 0.5])
+    usual = none.with_default_std({"torque": 0.7})
+    assert usual.std[:4] == pytest.approx([0.7, 0.7, 0.7, 0.7])
     assert usual.std[4:].tolist() == found.std[4:].tolist()
 
 
@@ -79,17 +82,18 @@ def test_noise_is_that_of_expected_values_and_never_nothing():
 
 def test_a_channel_of_unknown_noise_is_left_out_with_a_note():
     found = stack_readings(case_of(), driven(case_of()))
-    assert found.with_known_noise() == (found, [])
+    assert found.with_known_noise() is found
     unknown = replace(found, std=np.where(found.channel == 1, np.nan, found.std))
-    kept, (note,) = unknown.with_known_noise()
+    kept = unknown.with_known_noise()
+    (note,) = kept.notes
     assert kept.channels == (found.channels[0], found.channels[2])
     assert kept.noise == (found.noise[0], found.noise[2])
     assert set(kept.channel[:32]) == {0} and set(kept.channel[32:]) == {1}
     assert kept.measured.tolist() == found.measured[found.channel != 1].tolist()
     assert note.code == "unused-channel"
-    assert note.text.startswith("drawbar_pull_N is excluded: its noise is not declared")
+    assert note.text.startswith("drawbar_pull_N is not used: its noise is not declared")
     nothing = replace(found, std=np.full(len(found), np.nan))
-    assert nothing.with_known_noise() == (nothing, [])
+    assert nothing.with_known_noise() is nothing
 
 
 @pytest.mark.parametrize("more, every", [(0, None), (1, 2), (MOST_READINGS, 2)])

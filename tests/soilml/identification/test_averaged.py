@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gap_sets import case_of, driven
 
 from datagen.recipe import read_recipe
 from soilml import Operating, Table, identify
@@ -107,3 +108,12 @@ def test_identify_and_gap_of_the_same_rows_compute_one_posterior(monkeypatch):
     identify(CASE, table)
     gap(CASE, table)
     assert len(searched) == 1
+
+
+def test_scatter_of_the_soil_from_run_to_run_is_no_misfit():
+    """Residuals of twice the noise or more, which another soil in each run explains."""
+    case = case_of()
+    factors = np.exp(0.05 * np.random.default_rng(101).standard_normal(6))
+    loads, soils = (40.0, 60.0, 90.0, 140.0, 50.0, 75.0), {"kphi": case.soil.kphi * factors}
+    fit = identify(case, driven(case, loads=loads, soils=soils, seed=1))
+    assert fit.misfit > 4.0 and fit.fits

@@ -155,9 +155,9 @@ def test_a_narrow_and_bent_posterior_keeps_its_tails():
     case = case_of(text)
     free = select_free(case, None)
     readings = stack_readings(case, driven(case, loads=(60.0, 120.0), slips=10))
-    found = sample_posterior(case, readings, free)
-    weighted, optimum = fit_under_declared_noise(case, readings, free)
-    whole = importance_sample(PosteriorDensity(weighted, optimum.x), len(free), seed=1)
+    optimum = fit_under_declared_noise(case, readings, free)
+    found = sample_posterior(optimum)
+    whole = importance_sample(PosteriorDensity(optimum.problem, optimum.x), len(free), seed=1)
     ends = np.asarray([0.02, 0.5, 0.98])
     std = np.sqrt(whole.mean((whole.u - whole.mean(whole.u)) ** 2))
     off = (found.quantiles(found.u, ends) - whole.quantiles(whole.u, ends)) / std
