@@ -32,7 +32,6 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/presentation.py": {"matplotlib"},
     "soilml/gap/scores.py": {"scipy"},
-    "soilml/gap/identifiability.py": {"scipy"},
     "soilml/inference/evidence.py": {"scipy"},
     "soilml/inference/priors.py": {"scipy"},
     "soilml/inference/gaussian_terms.py": {"scipy"},

@@ -213,8 +213,6 @@ def _next_runs(found: GapReport) -> ReportTable:
     runs = found.next_runs
     sigma = [min(run.discrimination, _MOST_SIGMA) for run in runs]
     columns = [Column("kind", [run.kind for run in runs]), Column("sigma", sigma, digits=3)]
-    if runs[0].cost is not None:
-        columns.append(Column("cost", [run.cost for run in runs], digits=3))
     columns.append(Column("what to do", [run.text for run in runs]))
     first, *others = [" + ".join(names) or "the soil alone" for names in runs[0].compared or [()]]
     apart = f" of {first} from {', '.join(others)}" if others else ""
@@ -277,11 +275,8 @@ def _planned_runs(found: GapReport) -> dict[str, list[Any]]:
     for number, option in enumerate(found.next_runs, 1):
         head: dict[str, Any] = {"run": f"next_{number}", "kind": option.kind, "what": option.text}
         head["separates_sigma"] = option.discrimination
-        if option.cost is not None:
-            head["cost"] = option.cost
         lines += [head | row for row in option.rows or [{}]]
     names = ["run", "kind", "what", "separates_sigma"]
-    names += ["cost"] if any("cost" in line for line in lines) else []
     names += ["slip", "load_N"]
     names += [name for line in lines for name in line if name not in names]
     return {name: [line.get(name, "") for line in lines] for name in dict.fromkeys(names)}

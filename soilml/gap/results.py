@@ -147,7 +147,6 @@ class NextRun:
     discrimination: float  # expected, in sigma, between the remaining explanations
     #: operating points and predictions of each explanation
     rows: tuple[dict[str, float | str], ...] = field(metadata=ELSEWHERE)
-    cost: float | None = None  # where costs are given, in their unit
     #: The explanations that it separates: the first one from each other one
     compared: tuple[tuple[str, ...], ...] = ()
 

@@ -1,9 +1,6 @@
-"""Scores of columns against residuals, their p values, and how similar signatures are."""
+"""Scores of columns against residuals, and their p values."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -44,35 +41,3 @@ def chi_square_tail(value: float, degrees_of_freedom: float) -> float:
     from scipy.special import chdtrc
 
     return float(chdtrc(degrees_of_freedom, value))
-
-
-@dataclass(frozen=True)
-class SignatureSimilarity:
-    """Norms (sigma) and cosines of the catalogue's signatures, with the soil projected out."""
-
-    names: tuple[str, ...]
-    norm: Floats  # (k,)
-    cosine: Floats  # (k, k), absolute, with a zero diagonal
-
-    @staticmethod
-    def beside(space: Floats, columns: Mapping[str, Floats]) -> SignatureSimilarity:
-        """Of whitened signatures (m,) by name, `space` (m, p) projected out."""
-        projected = project_out(np.stack(list(columns.values()), axis=1), space)
-        norm = np.linalg.norm(projected, axis=0)
-        unit = projected / np.where(norm > 0, norm, 1.0)
-        cosine = np.abs(unit.T @ unit)
-        np.fill_diagonal(cosine, 0.0)
-        return SignatureSimilarity(tuple(columns), norm, cosine)
-
-    def separation(self, name: str, size: float) -> tuple[float, str]:
-        """Separating signal-to-noise ratio of an effect at a size, and its nearest rival.
-
-        Norm of the effect's projected signature times the sine of the angle to the nearest
-        rival's, in sigma; `size` is in reference sizes.
-        """
-        if name not in self.names:
-            return 0.0, ""
-        i = self.names.index(name)
-        rival = int(np.argmax(self.cosine[i]))
-        sine = float(np.sqrt(max(0.0, 1.0 - self.cosine[i, rival] ** 2)))
-        return abs(size) * float(self.norm[i]) * sine, self.names[rival]

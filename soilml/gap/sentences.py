@@ -254,13 +254,12 @@ def _fitting(begin: str, parts: Sequence[str]) -> int:
 def next_run_in_words(run: NextRun) -> str:
     """The first of the next runs, which explanations it separates, and by how much."""
     sigma = "10 or more" if run.discrimination >= 10.0 else decimal(run.discrimination, 2)
-    cost = "" if run.cost is None else f" at a cost of {run.cost:g}"
     first, *rivals = [" + ".join(names) or "the soil alone" for names in run.compared]
     against, average = rivals[0], ""
     if len(rivals) > 1:
         against += f" and {len(rivals) - 1} other{'s' if len(rivals) > 2 else ''}"
         average = " on average"
-    what = f"separates {first} from {against} by {sigma} sigma{average}{cost}."
+    what = f"separates {first} from {against} by {sigma} sigma{average}."
     begin = f"Next: {run.kind} ({run.text})"
     one = f"{begin}, which {what}"
     return one if len(one.split()) <= SENTENCE_WORDS else f"{begin}. This {what}"

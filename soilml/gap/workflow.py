@@ -54,7 +54,6 @@ from soilml.gap.next_runs import competing_explanations, next_runs
 from soilml.gap.notes import analysis_notes, hidden_effect, outlier_names
 from soilml.gap.remainder import discrepancy_map, remaining_discrepancy
 from soilml.gap.results import GapReport
-from soilml.gap.run_options import check_costs, rank_by_cost
 from soilml.gap.sentences import headline, report_lines
 from soilml.inference import constants
 from soilml.inference.posterior import Posterior, infer
@@ -86,7 +85,6 @@ def gap(
     holdout: str | None = None,
     effects: Mapping[str, type[Effect]] = EFFECTS,
     calibration: Mapping[str, float] | None = None,
-    costs: Mapping[str, float] | None = None,
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> GapReport:
@@ -111,9 +109,6 @@ def gap(
     calibration : mapping, optional
         Standard deviation of the remaining error of a calibrated sensor, by effect name, in the
         unit of the effect's size; by default as the bias of the case declares it.
-    costs : mapping, optional
-        Cost of each kind of next run or check, in any unit, 1 where none is given; they are then
-        ranked by what they discriminate per cost.
     seed : int
         Of all random draws; the same input gives the same report.
     progress : callable, optional
@@ -156,7 +151,6 @@ def gap(
     case = as_case(case)
     effects = candidate_effects(case, effects)
     case = case.without_learned_discrepancy().without_explanations()
-    known_costs = check_costs(costs or {})
     table, remarks = prepared_rows(case, as_table(table), FROM_ORDER)
     known, case = case.remainder, case.without_remainder_of(table)
     remarks += [] if case.remainder is known else [SAME_ROWS]
@@ -186,7 +180,6 @@ def gap(
     if report.model.remainder not in (None, case.remainder):
         learned = report.model.remainder.of_rows(split.analysed)
         report = replace(report, model=replace(report.model, remainder=learned))
-    report = replace(report, next_runs=tuple(rank_by_cost(report.next_runs, known_costs)))
     lines = report_lines(report, effect_names(case))
     report = replace(report, sentence=headline(report), lines=lines)
     conclusions = unsupported_conclusions(report, obstacles, fixed_parameters(case, soil))

@@ -138,18 +138,6 @@ def analysed(inputs, tmp_path, capsys, *arguments):
     return found
 
 
-def test_next_runs_carry_their_costs_where_some_are_given(inputs, tmp_path, capsys):
-    files = (str(inputs / "model.toml"), str(inputs / "runs.csv"))
-    found = analysed(inputs, tmp_path, capsys, *files, "--cost", "heavier=50")
-    costs = {run["kind"]: run["cost"] for run in found["next_runs"]}
-    assert set(costs.values()) <= {1.0, 50.0}
-    per_cost = [run["discrimination"] / run["cost"] for run in found["next_runs"]]
-    assert per_cost == sorted(per_cost, reverse=True)
-    text = (tmp_path / "out" / "next_runs.csv").read_text()
-    header = ["run", "kind", "what", "separates_sigma", "cost", "slip", "load_N"]
-    assert text.splitlines()[0].split(",")[:7] == header
-
-
 def test_two_rows_are_bad_data(inputs, tmp_path, capsys):
     files = (str(inputs / "model.toml"), str(inputs / "two.csv"))
     found = analysed(inputs, tmp_path, capsys, *files, "--seed", "3")
