@@ -167,7 +167,7 @@ def _said(report: GapReport) -> Row:
         "gap_probability": report.gap_probability,
         "reasons": texts(report.reasons),
         "gap": {k: (s.before, s.after) for k, s in report.gap.items()},
-        "codes": sorted({r.code for r in (*report.reasons, *report.notes, *report.conditions)}),
+        "codes": sorted({r.code for r in (*report.reasons, *report.notes)}),
     }
 
 

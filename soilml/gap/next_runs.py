@@ -19,7 +19,6 @@ from soilml.fitting.readings import Readings
 from soilml.gap.decision import Decision
 from soilml.gap.results import NextRun, Suspect
 from soilml.gap.run_options import CHECKS, RunOption, run_options, with_default_covariates
-from soilml.gap.sentences import SUSPECTS_IN_LINE
 from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import scatter_columns, terms_like
 from soilml.inference.posterior import Posterior
@@ -33,7 +32,8 @@ MAX_DISCRIMINATION = 10.0
 MIN_DISCRIMINATION = 0.5
 #: Largest difference, in sigma of a reading, of two predictions that count as equal.
 SAME_PREDICTION = 0.1
-COMPARED, LISTED = 5, 8  # Explanations that are compared, and proposals that are listed
+#: Explanations that are compared: suspects, or members of a class; and proposals that are listed.
+RIVALS, COMPARED, LISTED = 3, 5, 8
 
 #: Whitened difference (m,) of two explanations on some rows, and the rival's Jacobian (m, p).
 Difference = tuple[Floats, Floats]
@@ -62,7 +62,7 @@ def competing_explanations(
     sets = list(decision.claimed)
     if len(sets) < 2:
         stated = [s.effects for i, s in enumerate(listed) if i < 2 or s.probability >= LEAST_STATED]
-        sets = list(dict.fromkeys([*decision.listed[:1], *stated]))[:SUSPECTS_IN_LINE]
+        sets = list(dict.fromkeys([*decision.listed[:1], *stated]))[:RIVALS]
     nodes = [node for names in sets if (node := posterior.node_of(names)) is not None]
     return nodes if len(nodes) > 1 else [*nodes, posterior.soil]
 

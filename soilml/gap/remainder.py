@@ -17,11 +17,11 @@ from soilml.fitting.least_squares import Solution
 from soilml.fitting.levels import Levels
 from soilml.fitting.readings import Readings
 from soilml.gap.results import RegionScore, RemainingDiscrepancy
-from soilml.gap.scores import family_wise_p, scores
 from soilml.inference.constants import INTERVAL_FACTOR
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
 from soilml.numerics.prior import UNIFORM_PRECISION
+from soilml.numerics.subspaces import project_out
 from soilml.quantities import QUANTITIES, column
 from soilml.report.numbers import decimal, shown_unit
 
@@ -111,6 +111,34 @@ def discrepancy_map(posterior: Posterior, soil: Solution) -> list[RegionScore]:
         p = family_wise_p(float(z[i]), len(parts))
         found.append(RegionScore(column(channel), slip, load, signed, p))
     return found
+
+
+def scores(residual: Floats, columns: Floats, space: Floats) -> Floats:
+    r"""Score (k,) of each whitened column (m, k) against whitened residuals (m,).
+
+    .. math:: z_i = g_{\perp i} \cdot r / |g_{\perp i}|
+
+    space (m, p): Directions that are projected out of the columns. A column in their span has the
+        score zero.
+
+    References: Rao, Proc. Cambridge Phil. Soc. 44, 1948.
+    """
+    projected = project_out(columns, space)
+    norm, whole = np.linalg.norm(projected, axis=0), np.linalg.norm(columns, axis=0)
+    testable = norm > 1e-4 * np.maximum(whole, 1e-300)
+    return np.where(testable, projected.T @ residual / np.where(testable, norm, 1.0), 0.0)
+
+
+def family_wise_p(z: float, count: int) -> float:
+    """Probability that the largest of so many independent normal scores is as far from zero.
+
+    References: Sidak, Journal of the American Statistical Association 62, 1967; correlated scores
+    make it an upper bound.
+    """
+    from scipy.special import ndtr
+
+    p = -np.expm1(count * np.log1p(-2.0 * ndtr(-abs(z))))
+    return max(float(p), float(np.finfo(float).tiny))
 
 
 #: A channel, ends of slips and of loads (N), and which readings (m,) of it are between.

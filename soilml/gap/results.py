@@ -42,7 +42,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Suspect:
-    """An explanation with its odds against all others, under the conditions of the report."""
+    """An explanation with its odds against all others."""
 
     effects: tuple[str, ...]
     log_odds: float  # natural logarithm, within the catalogue
@@ -152,26 +152,6 @@ class NextRun:
 
 
 @dataclass(frozen=True)
-class NoiseAgreement:
-    """Mean squared residuals of the soil alone, per degree of freedom, in variances of the noise.
-
-    Of the readings that were not excluded as outliers.
-    """
-
-    declared: float  # under the declared noise, as `identify` states it where none was excluded
-    exceeds_noise: bool  # whether noise alone would exceed it with a probability below 0.001
-    granted: float  # under noise, and scatter of the soil from run to run as below
-    friction_angle_std: float  # rad
-    bearing_std: float  # relative
-    with_discrepancy: bool = False  # Whether a declared discrepancy is part of the noise
-
-    @property
-    def grants_scatter(self) -> bool:
-        """Whether the soil may differ from run to run."""
-        return self.friction_angle_std > 0.0 or self.bearing_std > 0.0
-
-
-@dataclass(frozen=True)
 class SoilTestAgreement:
     """A plate or shear test, and the same quantity by the soil before and after.
 
@@ -211,14 +191,12 @@ class GapReport(Result):
         what is shown.
     outside_probability : float
         That there is a gap with a cause which no effect of the catalogue describes.
-    suspects, conditions : tuple of Suspect, tuple of Remark
-        Explanations with their odds, which are valid under `conditions`, the likeliest first.
+    suspects : tuple of Suspect
+        Explanations with their odds, the likeliest first.
     discrepancy : dict of RemainingDiscrepancy
         Smooth discrepancy of each channel before and after, by column.
     remainder_cause : RemainderCause, optional
         Stage of the cause of the remainder, and what it depends on, where the readings tell.
-    best_unclaimed : tuple of str
-        The explanation that is likeliest where no cause is claimed.
     reasons : tuple of Remark
         Why no cause can be named, or why the data cannot be analysed.
     where : tuple of RegionScore
@@ -234,11 +212,11 @@ class GapReport(Result):
     untestable : dict of Remark
         Why these runs cannot test an effect, by its name.
     notes, not_claimed : tuple of Remark
-        What to know of the data and of the fit; conclusions that the report does not support.
+        What to know of the data and of the fit; what these runs cannot tell apart.
     variance_components : dict of float
         Estimated noise scales, run-to-run standard deviations and autocorrelation.
-    misfit : NoiseAgreement, optional
-        Residuals of the soil alone under the declared noise, and with scatter.
+    misfit : float, optional
+        Mean squared residual of the soil alone per degree of freedom under the declared noise.
     """
 
     status: str
@@ -248,10 +226,8 @@ class GapReport(Result):
     cause_set: tuple[tuple[str, ...], ...] = ()
     probabilities: dict[str, float] = field(default_factory=dict)
     suspects: tuple[Suspect, ...] = ()
-    conditions: tuple[Remark, ...] = ()
     discrepancy: dict[str, RemainingDiscrepancy] = field(default_factory=dict)
     remainder_cause: RemainderCause | None = None
-    best_unclaimed: tuple[str, ...] = ()
     lines: tuple[Remark, ...] = ()
     reasons: tuple[Remark, ...] = ()
     where: tuple[RegionScore, ...] = ()
@@ -263,12 +239,19 @@ class GapReport(Result):
     notes: tuple[Remark, ...] = ()
     not_claimed: tuple[Remark, ...] = ()
     variance_components: dict[str, float] = field(default_factory=dict)
-    misfit: NoiseAgreement | None = None
+    misfit: float | None = None
     gap_probability: float = 0.0
     remainder_probability: float = 0.0
     outside_probability: float = 0.0
     seed: int = 0
     curves: FittedReadings | None = field(default=None, metadata=ELSEWHERE)
+
+    @property
+    def first(self) -> tuple[str, ...]:
+        """The effects that are claimed, else those of the first suspect."""
+        if self.effects:
+            return tuple(e.name for e in self.effects)
+        return self.suspects[0].effects if self.suspects else ()
 
     def report(self) -> Report:
         """Verdict, soil and effects, readings beside the model, where it disagrees, and by what."""
