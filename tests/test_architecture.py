@@ -31,7 +31,6 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/systems/rim_stress/stress.py": {"scipy"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/presentation.py": {"matplotlib"},
-    "soilml/gap/remainder.py": {"scipy"},
     "soilml/gap/notes.py": {"scipy"},
     "soilml/inference/evidence.py": {"scipy"},
     "soilml/inference/priors.py": {"scipy"},

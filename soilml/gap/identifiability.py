@@ -28,8 +28,7 @@ from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
-from soilml.report.figure_style import AFTER, UNCHANGED
-from soilml.report.report import Picture, Report
+from soilml.report.report import Report
 from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
 from soilml.row_status import Status
@@ -262,35 +261,7 @@ def audit_report(found: Audit) -> Report:
         verdict=f"These runs could name {len(named)} of {count} effects.",
         lines=[f"They could name: {', '.join(named)}."] if named else [],
         tables=[table] if effects else [],
-        pictures=[_picture(found)] if effects else [],
         details=[("Effects that cannot be tested", untested)] if untested else [],
         status=f"{len(named)} of {count}",
         title="Effects that a design could name",
     )
-
-
-def _picture(found: Audit) -> Picture:
-    effects = found.effects
-
-    def draw(axes: Any) -> None:
-        panel, y = np.ravel(axes)[0], np.arange(len(effects))
-        left = [e.residual_signal for e in effects]
-        apart = [e.separating_snr for e in effects]
-        panel.barh(y - 0.19, left, 0.36, color=UNCHANGED, label="that the soil cannot imitate")
-        panel.barh(
-            y + 0.19, apart, 0.36, color=AFTER, label="that separates it from its nearest rival"
-        )
-        panel.axvline(NAMEABLE_SIGMA, color="black", lw=1.2)
-        panel.set_xscale("symlog", linthresh=1.0)
-        panel.set_xlim(left=0.0)
-        panel.xaxis.set_major_formatter("{x:g}")
-        panel.set_yticks(y, [e.name for e in effects])
-        panel.set_ylim(len(effects) - 0.5, -0.5)
-        panel.set_xlabel(
-            f"signal at the reference size, σ; line: {NAMEABLE_SIGMA:g} σ name an effect"
-        )
-        panel.legend(loc="lower right")  # the best separated stand above
-
-    size = (5.6, 1.0 + 0.34 * len(effects))
-    alt = "signal of each effect beside the soil, and beside its nearest rival"
-    return Picture("Signals of the effects", draw, 1, 1, size, alt)

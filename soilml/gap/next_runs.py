@@ -223,9 +223,8 @@ def _difference_of_parameters(
     rates = rates_at(rival.coordinates, rival.x)
     for i, (path, given) in enumerate(stds.items()):
         own, other = (_value(fit, path) for fit in (first, rival))
-        std = given
-        if isinstance(given, str):
-            std = float(given.removesuffix(" %")) / 100.0 * abs(own)
+        share = float(given.removesuffix(" %")) / 100.0 if isinstance(given, str) else 0.0
+        std = share * abs(own) if isinstance(given, str) else given
         difference[i] = (own - other) / std
         jacobian[i] = np.where([c.path == path for c in rival.coordinates], rates / std, 0.0)
     return difference, jacobian

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
@@ -31,7 +32,6 @@ LEAST_AMPLITUDE = 0.1
 MOST_LOG_VARIANCE = 0.5
 #: Bins along slip and along load of the discrepancy map at most, and readings that a region needs.
 SLIP_BINS, LOAD_BINS, MIN_READINGS = 4, 3, 2
-MOST_LEFT_OUT = 0.1  # Share of the readings in regions with too few for which fewer bins are made
 #: Variance of the process that the points may leave out anywhere at the readings, as a fraction of
 #: it and, where that is less, of the variance of the noise.
 LEFT_OUT, LEFT_OUT_OF_NOISE = 1e-3, 0.04
@@ -92,53 +92,35 @@ def discrepancy_amplitudes(
 
 
 def discrepancy_map(posterior: Posterior, soil: Solution) -> list[RegionScore]:
-    """Score of each region of the data against the fit of the soil alone, the largest first.
-
-    The score is positive where the mean reading is above the prediction. Outliers count in none.
-    """
-    readings, std, whiten = posterior.terms.readings, posterior.std, posterior.whiten
-    parts = regions(readings)
-    if not parts:
-        return []
-    columns = np.stack([np.where(inside, std, 0.0) for *_, inside in parts], axis=1)
-    fit = soil.whitened_by(whiten)
-    z = np.abs(scores(fit.residual, np.asarray(whiten @ columns), fit.jacobian))
-    standardised = (readings.measured - fit.prediction) / std
-    found = []
-    for i in np.argsort(-z, kind="stable"):
-        channel, slip, load, inside = parts[i]
-        signed = float(np.copysign(z[i], np.mean(standardised[inside])))
-        p = family_wise_p(float(z[i]), len(parts))
-        found.append(RegionScore(column(channel), slip, load, signed, p))
-    return found
-
-
-def scores(residual: Floats, columns: Floats, space: Floats) -> Floats:
-    r"""Score (k,) of each whitened column (m, k) against whitened residuals (m,).
+    r"""Score of each region of the data against the fit of the soil alone, the largest first.
 
     .. math:: z_i = g_{\perp i} \cdot r / |g_{\perp i}|
 
-    space (m, p): Directions that are projected out of the columns. A column in their span has the
-        score zero.
+    with whitened residuals r, and a common shift g of the readings of the region, whitened and
+    without what the soil can imitate. It is positive where readings are above the prediction.
+    Outliers count in none. p is the probability that the largest of so many independent normal
+    scores is as far from zero; correlated scores make it an upper bound.
 
-    References: Rao, Proc. Cambridge Phil. Soc. 44, 1948.
+    References: Rao, Proc. Cambridge Phil. Soc. 44, 1948; Sidak, Journal of the American Statistical
+    Association 62, 1967.
     """
-    projected = project_out(columns, space)
-    norm, whole = np.linalg.norm(projected, axis=0), np.linalg.norm(columns, axis=0)
-    testable = norm > 1e-4 * np.maximum(whole, 1e-300)
-    return np.where(testable, projected.T @ residual / np.where(testable, norm, 1.0), 0.0)
-
-
-def family_wise_p(z: float, count: int) -> float:
-    """Probability that the largest of so many independent normal scores is as far from zero.
-
-    References: Sidak, Journal of the American Statistical Association 62, 1967; correlated scores
-    make it an upper bound.
-    """
-    from scipy.special import ndtr
-
-    p = -np.expm1(count * np.log1p(-2.0 * ndtr(-abs(z))))
-    return max(float(p), float(np.finfo(float).tiny))
+    whiten, parts = posterior.whiten, regions(posterior.terms.readings)
+    if not parts:
+        return []
+    fit = soil.whitened_by(whiten)
+    shifts = np.stack([np.where(inside, posterior.std, 0.0) for *_, inside in parts], axis=1)
+    white = np.asarray(whiten @ shifts)
+    left = project_out(white, fit.jacobian)
+    norm = np.linalg.norm(left, axis=0)
+    seen = norm > 1e-4 * np.maximum(np.linalg.norm(white, axis=0), 1e-300)
+    z = np.where(seen, left.T @ fit.residual / np.where(seen, norm, 1.0), 0.0)
+    found = []
+    for i in np.argsort(-np.abs(z), kind="stable"):
+        channel, slip, load, _ = parts[i]
+        p = -np.expm1(len(parts) * np.log1p(-math.erfc(abs(z[i]) / math.sqrt(2.0))))
+        p = max(float(p), float(np.finfo(float).tiny))
+        found.append(RegionScore(column(channel), slip, load, float(z[i]), p))
+    return found
 
 
 #: A channel, ends of slips and of loads (N), and which readings (m,) of it are between.
@@ -146,28 +128,16 @@ Region = tuple[str, tuple[float, float], tuple[float, float], NDArray[np.bool_]]
 
 
 def regions(readings: Readings) -> list[Region]:
-    """Channel by slip bin by load bin, those with enough readings.
-
-    In as many slip bins as leave no more than `MOST_LEFT_OUT` of the readings in none.
-    """
-
-    def of(slip_bins: int) -> list[Region]:
-        slips = _bins(readings.slip, readings.slip_levels, slip_bins)
-        loads = _bins(readings.load, readings.load_levels, LOAD_BINS)
-        found = []
-        for (i, name), slip, load in product(enumerate(readings.channels), slips, loads):
-            inside = (readings.channel == i) & (slip[0] <= readings.slip)
-            inside &= (readings.slip <= slip[1]) & (load[0] <= readings.load)
-            inside &= readings.load <= load[1]
-            if inside.sum() >= MIN_READINGS:
-                found.append((name, slip, load, inside))
-        return found
-
-    def excess(parts: list[Region]) -> float:
-        inside = sum(int(own[-1].sum()) for own in parts)
-        return max(1.0 - inside / len(readings), MOST_LEFT_OUT)
-
-    return min((of(count) for count in range(SLIP_BINS, 0, -1)), key=excess)
+    """Channel by slip bin by load bin, those with enough readings."""
+    slips = _bins(readings.slip, readings.slip_levels, SLIP_BINS)
+    loads = _bins(readings.load, readings.load_levels, LOAD_BINS)
+    found = []
+    for (i, name), slip, load in product(enumerate(readings.channels), slips, loads):
+        inside = (readings.channel == i) & (slip[0] <= readings.slip) & (readings.slip <= slip[1])
+        inside &= (load[0] <= readings.load) & (readings.load <= load[1])
+        if inside.sum() >= MIN_READINGS:
+            found.append((name, slip, load, inside))
+    return found
 
 
 def _bins(values: Floats, levels: Levels, count: int) -> list[tuple[float, float]]:

@@ -151,22 +151,6 @@ class NextRun:
     compared: tuple[tuple[str, ...], ...] = ()
 
 
-@dataclass(frozen=True)
-class SoilTestAgreement:
-    """A plate or shear test, and the same quantity by the soil before and after.
-
-    `sigma_before` and `sigma_after` are the distances in standard deviations of the logarithm.
-    """
-
-    label: str
-    unit: str
-    measured: float
-    before: float
-    after: float
-    sigma_before: float
-    sigma_after: float
-
-
 @dataclass(frozen=True, repr=False)
 class GapReport(Result):
     """The result of a gap analysis, made by `soilml.gap.gap`.
@@ -290,28 +274,26 @@ class GapReport(Result):
         }
 
     @property
-    def soil_tests(self) -> list[SoilTestAgreement]:
-        """The tests of the model's soil, beside the soil before and after."""
-        tests, pairs = self.model.soil_tests, []
+    def soil_tests(self) -> list[dict[str, Any]]:
+        """Each test of the model's soil, and how far the soil before and after is from it.
+
+        `sigma_before` and `sigma_after` are in standard deviations of its logarithm.
+        """
+        tests, sigmas = self.model.soil_tests, []
         for soil in (self.soil_before, self.soil_after):
             values = np.asarray([estimate.value for estimate in soil.values()])
-            pairs.append(deviations(tests, self.model.soil, list(soil), values).tolist())
+            sigmas.append(deviations(tests, self.model.soil, list(soil), values).tolist())
+        names = ("label", "unit", "measured", "sigma_before", "sigma_after")
         return [
-            SoilTestAgreement(
-                test.label(),
-                test.unit,
-                test.measured,
-                *(test.measured * float(np.exp(z * test.scatter)) for z in both),
-                *both,
-            )
-            for test, *both in zip(tests, *pairs, strict=True)
+            dict(zip(names, (test.label(), test.unit, test.measured, *both), strict=True))
+            for test, *both in zip(tests, *sigmas, strict=True)
         ]
 
     def as_json(self) -> dict[str, Any]:
         """The content of gap.json."""
         from soilml import __version__
 
-        more = {"soil_tests": as_json_entry(self.soil_tests), "soilml_version": __version__}
+        more = {"soil_tests": self.soil_tests, "soilml_version": __version__}
         return {**as_json_entry(self), **more}
 
 
