@@ -30,6 +30,8 @@ from soilml.quantities import COLUMNS
 #: Required columns of a table of measured runs; a blank cell is a missing measurement.
 _OTHERS = {"drawbar_pull_N", "sinkage_m"}  # Measured quantities that need no torque beside them
 RUNS = ("run", "slip", "load_N", "torque_Nm")
+#: Name of the run of all rows of a table that has no column of runs.
+ONE_RUN = "all rows"
 #: Columns that `soilml simulate` adds, which follow from the others and are passed over.
 DERIVED = (
     *("tractive_efficiency", "pull_efficiency", "traffic_class"),
@@ -177,12 +179,13 @@ def check_table(
         # a table of pulls or sinkages alone: its torque was not measured
         unmeasured = {"torque_Nm": np.full(len(table), np.nan)}
         table = replace(table, columns={**table.columns, **unmeasured})
+    if "run" in need and "run" not in table:
+        table = replace(table, columns={"run": np.full(len(table), ONE_RUN), **table.columns})
     for name in need:
         if name not in table:
-            hint = {
-                "torque_Nm": "needed is a torque, a drawbar_pull_N or a sinkage_m",
-                "run": "add it, with one name for all rows that were measured together",
-            }.get(name, f"found: {', '.join(table.columns) or 'no column'}")
+            hint = f"found: {', '.join(table.columns) or 'no column'}"
+            if name == "torque_Nm":
+                hint = "needed is a torque, a drawbar_pull_N or a sinkage_m"
             raise TableError(f"{file}: column {name} is missing; {hint}")
     if len(table) == 0:
         raise TableError(f"{file}: the table has a header but no row")

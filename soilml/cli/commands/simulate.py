@@ -22,10 +22,11 @@ the slips and loads.
   soilml simulate MODEL.toml --slip 0:0.6:13 --load 60 --out curve.csv
   soilml simulate MODEL.toml --slip -0.3,0,0.3 --load 30:120:4 --run sim
 
-Ranges are start:stop:count, or values with commas. With --run, `soilml
-identify` can read the table. A row without equilibrium has blank values and
-the reason in the column `status`; it is an error if no row has an equilibrium.
-The mean of a [remainder] of MODEL.toml is added; --std gives its uncertainty.
+Ranges are start:stop:count, or values with commas. --run names the run that
+`soilml identify` reads in the table. A row without equilibrium has blank
+values and the reason in the column `status`; it is an error if no row has an
+equilibrium. The mean of a [remainder] of MODEL.toml is added; --std gives its
+uncertainty.
 --efficiency adds tractive efficiency (1 - s) r DP/T, and pull efficiency with
 its class (Comin and Saaj 2017, eq. 32). --balance adds how a track stands:
 shares of the load, trim, sinkage of the rear wheel, tension.

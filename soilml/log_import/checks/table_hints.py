@@ -19,6 +19,7 @@ from soilml.fitting.coordinates import select_free
 from soilml.fitting.misfit import declared_misfit
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.fitting.usable_readings import usable_readings
+from soilml.io.read_table import ONE_RUN
 from soilml.io.table import Table
 from soilml.log_import.channels.inputs import our_slip
 from soilml.log_import.checks.checked_rows import RowsToCheck
@@ -67,6 +68,9 @@ def table_remarks(table: Table, case: Case | None, radius: float | None = None) 
     if not len(used):
         return []
     hints = table_hints(used.columns, radii)
+    if "run" in used and set(used["run"].tolist()) == {ONE_RUN}:
+        text = "column run is missing: all rows are taken as one run, measured on one soil"
+        hints.append(Remark("no-runs", text, ("run",), "note"))
     told = any(hint.code == "slip-definition" for hint in hints)
     if case is not None and not case.gears and not told and other_definition_fits(case, used):
         text = (

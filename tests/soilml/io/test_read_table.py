@@ -6,6 +6,7 @@ import pytest
 from soilml import read_table
 from soilml.errors import TableError
 from soilml.io.read_table import RUNS
+from soilml.log_import.checks.table_hints import table_remarks
 
 GOOD = "run,slip,load_N,torque_Nm,sinkage_m\na,0.1,60,1.5,0.012\na,0.2,60,,0.013\nb,0.3,80,2.5,\n"
 
@@ -37,7 +38,6 @@ FAULTS = {
         "run,slip,load_N\na,0.1,60\n",
         "torque_Nm is missing; needed is a torque, a drawbar",
     ),
-    "missing run": (GOOD.replace("run,", "").replace("a,", "").replace("b,", ""), "run is missing"),
     "misspelt column": (GOOD.replace("torque_Nm", "torqe_Nm"), "did you mean 'torque_Nm'"),
     "wrong case": (GOOD.replace("torque_Nm", "Torque_nm"), "did you mean 'torque_Nm'"),
     "unit missing": (GOOD.replace("torque_Nm", "torque"), "name it torque_Nm"),
@@ -79,6 +79,13 @@ def test_faults_are_named_by_file_line_and_column(tmp_path, what):
     assert said in str(caught.value)
     assert "runs.csv" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_table_without_a_column_of_runs_is_one_run_and_says_so(tmp_path):
+    text = "slip,load_N,torque_Nm\n0.1,60,1.5\n0.2,60,2.5\n"
+    table = read_table(written(tmp_path, text), RUNS)
+    assert set(table["run"].tolist()) == {"all rows"}
+    assert [r.code for r in table_remarks(table, None, 0.15)] == ["no-runs"]
 
 
 def test_extra_columns_can_be_passed_over(tmp_path):
