@@ -97,29 +97,32 @@ def discrepancy_map(posterior: Posterior, soil: Solution) -> list[RegionScore]:
     .. math:: z_i = g_{\perp i} \cdot r / |g_{\perp i}|
 
     with whitened residuals r, and a common shift g of the readings of the region, whitened and
-    without what the soil can imitate. It is positive where readings are above the prediction.
-    Outliers count in none. p is the probability that the largest of so many independent normal
-    scores is as far from zero; correlated scores make it an upper bound.
+    without what the soil can imitate. Its sign is that of the mean residual. Outliers count in
+    none. p is the probability that the largest of so many independent normal scores is as far from
+    zero; correlated scores make it an upper bound.
 
     References: Rao, Proc. Cambridge Phil. Soc. 44, 1948; Sidak, Journal of the American Statistical
     Association 62, 1967.
     """
-    whiten, parts = posterior.whiten, regions(posterior.terms.readings)
+    readings, std, whiten = posterior.terms.readings, posterior.std, posterior.whiten
+    parts = regions(readings)
     if not parts:
         return []
     fit = soil.whitened_by(whiten)
-    shifts = np.stack([np.where(inside, posterior.std, 0.0) for *_, inside in parts], axis=1)
+    shifts = np.stack([np.where(inside, std, 0.0) for *_, inside in parts], axis=1)
     white = np.asarray(whiten @ shifts)
     left = project_out(white, fit.jacobian)
     norm = np.linalg.norm(left, axis=0)
     seen = norm > 1e-4 * np.maximum(np.linalg.norm(white, axis=0), 1e-300)
-    z = np.where(seen, left.T @ fit.residual / np.where(seen, norm, 1.0), 0.0)
+    z = np.where(seen, np.abs(left.T @ fit.residual) / np.where(seen, norm, 1.0), 0.0)
+    standardised = (readings.measured - fit.prediction) / std
     found = []
-    for i in np.argsort(-np.abs(z), kind="stable"):
-        channel, slip, load, _ = parts[i]
-        p = -np.expm1(len(parts) * np.log1p(-math.erfc(abs(z[i]) / math.sqrt(2.0))))
+    for i in np.argsort(-z, kind="stable"):
+        channel, slip, load, inside = parts[i]
+        signed = math.copysign(z[i], np.mean(standardised[inside]))
+        p = -np.expm1(len(parts) * np.log1p(-math.erfc(z[i] / math.sqrt(2.0))))
         p = max(float(p), float(np.finfo(float).tiny))
-        found.append(RegionScore(column(channel), slip, load, float(z[i]), p))
+        found.append(RegionScore(column(channel), slip, load, signed, p))
     return found
 
 
