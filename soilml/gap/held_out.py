@@ -169,7 +169,7 @@ def predictive_gains(posterior: Posterior, sets: Sequence[Names], seed: int) -> 
 
     def density(node: Explanation) -> float:
         sums = [
-            sum(posterior.log_density(node, folds.fold == k) for k in folds.predicted)
+            sum(node.linear.log_density(node.at, folds.fold == k) for k in folds.predicted)
             for folds in counted
         ]
         return float(np.mean(sums))

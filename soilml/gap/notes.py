@@ -25,8 +25,6 @@ AT_BOUND = 1e-3
 #: Change of the readings by an effect of usual size, in sigma, from which it is visible on a known
 #: soil, and what another soil leaves of it, below which it is not.
 VISIBLE, UNSEEN = 6.0, 2.0
-#: Share of the largest contribution to the other soil from which a parameter is stated.
-NOTABLE = 0.3
 
 
 def analysis_notes(
@@ -131,7 +129,7 @@ def indistinct(report: GapReport, posterior: Posterior, fixed: Sequence[str]) ->
 
 
 def like_another_soil(posterior: Posterior, soil: Solution) -> list[Remark]:
-    r"""The effects of usual size that a change of the soil imitates, by the parameters it takes.
+    r"""The effects of usual size that a change of the soil imitates.
 
     .. math:: \Delta x = (X^T V^{-1} X + P)^{-1} X^T V^{-1} s
 
@@ -139,28 +137,17 @@ def like_another_soil(posterior: Posterior, soil: Solution) -> list[Remark]:
     sigma, is the norm of :math:`s - X \Delta x`. References: omitted variables; Greene,
     Econometric Analysis, 7th ed., section 4.3.2.
     """
-    soil = soil.whitened_by(posterior.whiten)
-    alike: dict[tuple[str, ...], list[str]] = {}
+    soil, alike = soil.whitened_by(posterior.whiten), []
     for s in posterior.signatures:
         whole = np.asarray(posterior.whiten @ s.column)
         change = np.linalg.solve(soil.information, soil.jacobian.T @ whole)
         left = float(np.linalg.norm(whole - soil.jacobian @ change))
-        if float(np.linalg.norm(whole)) < VISIBLE or left >= UNSEEN:
-            continue
-        part = np.abs(change) * np.linalg.norm(soil.jacobian, axis=0)
-        taken = [
-            c.name.replace("_", " ")
-            for c, own in zip(soil.coordinates, part, strict=True)
-            if own >= NOTABLE * part.max()
-        ]
-        alike.setdefault(tuple(taken), []).append(s.name)
-    remarks = []
-    for parameters, names in alike.items():
-        are, them = ("are", "them") if len(names) > 1 else ("is", "it")
-        text = f"that {', '.join(names)} {are} absent: at usual size, these runs cannot tell {them}"
-        text += f" from another {', '.join(parameters)}"
-        remarks.append(Remark("like-another-soil", text, tuple(names)))
-    return remarks
+        if float(np.linalg.norm(whole)) >= VISIBLE and left < UNSEEN:
+            alike.append(s.name)
+    if not alike:
+        return []
+    text = f"that {', '.join(alike)} are absent: at usual size, these runs cannot tell them from "
+    return [Remark("like-another-soil", f"{text}another soil", tuple(alike))]
 
 
 def like_another_force(posterior: Posterior, names: Sequence[str]) -> list[Remark]:

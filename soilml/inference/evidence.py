@@ -262,6 +262,16 @@ class LinearisedFit:
         value -= 2.0 * float(np.log(constants.AUTOCORRELATIONS[at.autocorrelation]))
         return value + float(np.count_nonzero(~self.outliers)) * LOG_2PI
 
+    def log_density(self, at: Hyperparameters, left_out: Booleans) -> float:
+        r"""ln p of readings given all others: the difference of two evidences.
+
+        .. math:: \ln p(y_o \mid y_r) = \ln p(y) - \ln p(y_r)
+
+        References: Vehtari and Ojanen, Statistics Surveys 6, 2012, section 2 (the log score).
+        """
+        rest = self.without(self.outliers | left_out)
+        return -0.5 * (self.evaluate(at).value - rest.evaluate(at).value)
+
     def reduced(self, at: Hyperparameters) -> tuple[Floats, float]:
         """Products (p + 1, p + 1) of [J, r] under the covariance at `at`; ln of its determinant.
 
