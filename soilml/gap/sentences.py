@@ -26,6 +26,7 @@ from soilml.report.numbers import (
 HEADLINE_WORDS = 25  # Words of a headline, at most
 LISTED = 3  # Suspects, members of a class and reasons that a line lists
 HARDLY = 0.95  # Share of a gap that is left, above which it hardly shrinks
+LIKE_NOISE = 1.3  # Mean squared residual below which a gap is no matter of its size
 NOTABLE_DISCREPANCY = 0.3  # Discrepancy in sigma from which a line states it
 NOTABLE_OUTSIDE = 0.05  # Probability of a cause outside the catalogue from which a line states it
 
@@ -67,6 +68,14 @@ def _shrinks(report: GapReport) -> str:
     return f"; the gap {hardly}shrinks {before} -> {after}"
 
 
+def _size(report: GapReport) -> str:
+    """How large an unknown gap is; one of few sigma is no matter of its size."""
+    before = report.gap["train"].before
+    if before < LIKE_NOISE:
+        return "residuals form a pattern that noise does not"
+    return f"mean squared residual {format_residual(before)}; noise alone gives 1"
+
+
 def _faults(report: GapReport) -> str:
     """The first fault, if it can be said shortly, and how many there are."""
     count = len(report.reasons)
@@ -96,6 +105,7 @@ _WORDS = {
     "count": lambda report: len(report.cause_set),
     "gap": lambda report: format_probability(report.gap_probability),
     "residual": lambda report: format_residual(report.gap["train"].before),
+    "size": _size,
     "faults": _faults,
     "beside": _beside,
 }

@@ -60,8 +60,8 @@ STATUSES = {
     ),
     "unknown": Verdict(
         "there is a gap that no effect explains better than a smooth error",
-        "There is a gap that no effect explains better than a smooth error (mean squared residual "
-        "{residual}; noise alone gives 1; probability {gap}).",
+        "There is a gap that no effect explains better than a smooth error ({size}; probability "
+        "{gap}).",
         "See where the model disagrees, then check the sensors and the rig, or define an effect of "
         "your own.",
     ),

@@ -92,6 +92,8 @@ def test_without_a_cause_the_first_reason_is_stated():
     assert said("not-testable", reasons=reasons).endswith("its cause: there is one load only.")
     unknown = said("unknown", reasons=reasons, discrepancy=LEFT)
     assert "no effect explains better than a smooth error (mean squared residual 8.80" in unknown
+    small = {"train": GapReduction(1.2, 1.2, {}, 96, "all rows fitted")}
+    assert "(residuals form a pattern that noise does not; " in said("unknown", gap=small)
     found = lines("unknown", reasons=reasons, discrepancy=LEFT)
     assert found["why"] == "Why no cause is named: there is one load only; runs differ."
     assert found["left"] == REMAINDER.format("the soil alone")
