@@ -68,7 +68,7 @@ class Unknowns:
         context = sets.context_of(index)
         upper_ends = [f"{axis.name}_max" for axis in family.axes[: family.targets]]
         scale = np.asarray([context.get(name, 1.0) for name in upper_ends])
-        return Unknowns(family, float(sets.origin.normal_std[index]), scale)
+        return Unknowns(family, float(sets.normal_std[index]), scale)
 
     @property
     def count(self) -> int:
@@ -144,7 +144,7 @@ def exact_set_posterior(family: WheelFamily, sets: SimulatedSets, index: int) ->
     the prior do not carry the load, no polynomial fits, and the physics itself is evaluated.
     """
     unknowns = Unknowns.of(family, sets, index)
-    designs, truth = sets.origin.designs[index], sets.origin.x[index]
+    designs, truth = sets.designs[index], sets.x[index]
 
     def physics(x: Floats) -> Floats:
         batches = np.split(x, range(BATCH, len(x), BATCH))
@@ -194,7 +194,7 @@ def log_likelihood(
 
 def si_values(sets: SimulatedSets, index: int, y: Floats) -> Floats:
     """Torque, sinkage and drawbar pull (rows, n, 3) in SI units from a family's channels."""
-    length, load = sets.origin.length[index], sets.rows(index)["load"][:, None]
+    length, load = sets.length[index], sets.rows(index)["load"][:, None]
     with np.errstate(over="ignore"):
         return np.stack(
             [np.exp(y[..., 0]) * load * length, np.exp(y[..., 1]) * length, y[..., 2] * load],
@@ -206,9 +206,9 @@ def _noise_std(
     sets: SimulatedSets, index: int, name: str, read: NDArray[np.bool_], value: Floats
 ) -> Floats:
     """Noise of values (rows, n); zero where the sets have none of this name."""
-    if name not in sets.origin.noise:
+    if name not in sets.noise:
         return np.zeros_like(value)
-    constant, share = (part[index][read, None] for part in sets.origin.noise[name])
+    constant, share = (part[index][read, None] for part in sets.noise[name])
     return np.asarray(np.hypot(constant, share * value))
 
 
@@ -275,6 +275,4 @@ def posterior_of_memory(
     def log_likelihood(x: Floats) -> Floats:
         return np.asarray(-0.5 * ((monomials(x, these) @ a.T) ** 2).sum(axis=1))
 
-    return sample_posterior(Unknowns.of(family, sets, index), log_likelihood, sets.origin.x[index])[
-        0
-    ]
+    return sample_posterior(Unknowns.of(family, sets, index), log_likelihood, sets.x[index])[0]

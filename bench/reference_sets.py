@@ -64,7 +64,7 @@ class ReferenceSet:
         """Identifies the set that a stored posterior belongs to: readings, context, noise."""
         sets = self.sets
         inputs = sorted((sets.readings | sets.context).items())
-        noise = [(name, np.stack(parts)) for name, parts in sorted(sets.origin.noise.items())]
+        noise = sorted(sets.noise.items())
         text = [
             name + " ".join(f"{value:.{HASHED_DIGITS}g}" for value in np.ravel(values))
             for name, values in [*inputs, *noise]
@@ -89,9 +89,18 @@ def generate_reference_sets(max_sets: int = COUNT) -> list[ReferenceSet]:
             sets = family.sets(CANDIDATES * COUNT, rows, SEED)
             accepted = [i for i in range(len(sets.truth)) if _in_range(family, sets.context_of(i))]
             references += [
-                ReferenceSet(label, i, family, sets.select(i)) for i in accepted[:max_sets]
+                ReferenceSet(label, i, family, _one_of(sets, i)) for i in accepted[:max_sets]
             ]
     return references
+
+
+def _one_of(sets: SimulatedSets, index: int) -> SimulatedSets:
+    own = slice(index, index + 1)
+    readings = {name: values[own] for name, values in sets.readings.items()}
+    context = {name: values[own] for name, values in sets.context.items()}
+    noise = {name: values[:, own] for name, values in sets.noise.items()}
+    arrays = (sets.truth, sets.designs, sets.x, sets.normal_std, sets.length)
+    return SimulatedSets(readings, context, *(values[own] for values in arrays), noise)
 
 
 def _in_range(family: WheelFamily, context: Mapping[str, float]) -> bool:
@@ -140,8 +149,8 @@ def as_any_wheel_sets(references: Sequence[ReferenceSet]) -> list[ReferenceSet]:
     context = {name: np.asarray([value]) for name, value in values.items()}
     for reference in references:
         sets = reference.sets
-        x = np.pad(sets.origin.x, ((0, 0), (0, len(other.axes) - len(own.axes))))
-        sets = replace(sets, context=context, origin=replace(sets.origin, x=x))
+        x = np.pad(sets.x, ((0, 0), (0, len(other.axes) - len(own.axes))))
+        sets = replace(sets, context=context, x=x)
         converted.append(replace(reference, family=other, sets=sets))
     return converted
 
@@ -155,7 +164,7 @@ def with_noise_of_reading(references: Sequence[ReferenceSet]) -> list[ReferenceS
     for reference in references:
         sets = reference.sets
         readings = dict(sets.readings)
-        for name, (constant, share) in sets.origin.noise.items():
+        for name, (constant, share) in sets.noise.items():
             channel = "torque" if name == "torque_bias" else name
             key = name if name == "torque_bias" else f"{name}_std"
             std = np.hypot(constant, share * np.abs(readings[channel]))

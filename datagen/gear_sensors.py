@@ -22,7 +22,7 @@ from soilml.physics.gears import Midstance
 from soilml.physics.soils import Soil
 from soilml.quantities import QUANTITIES
 from soilml.systems.wheel_legs.stances import GRAVITY, SpringLeg, vibration_amplitude
-from soilml.systems.wheel_legs.stride_relations import VIBRATION_SLIP, soil_spring, spring_soil
+from soilml.systems.wheel_legs.stride_relations import VIBRATION, soil_spring, spring_soil
 
 #: Relations of vibration to slip: the rotating spring, or the straight line fitted to tests.
 LAWS = ("spring", "line")
@@ -101,7 +101,7 @@ class StickSlip:
         Raises `InputError` for a soil on which that line has no slope.
         """
         if self.law == "line":
-            a, b = VIBRATION_SLIP["linear"].line(*spring_soil(leg["increment"], leg["stiffness"]))
+            a, b = VIBRATION.line(*spring_soil(leg["increment"], leg["stiffness"]))
             if b.min() < MIN_SLOPE:
                 drop = np.rad2deg(leg["increment"][int(np.argmin(b))])
                 raise InputError(

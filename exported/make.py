@@ -45,8 +45,9 @@ WITH_SETS = ("wheel", "wheel_small", "kls1_wheel", "any_wheel", "any_wheel_small
 
 def write_graphs(names: Sequence[str]) -> None:
     """Write the set posteriors of all files, or of those named, around the response they have."""
+    from stored_response import write_anew
+
     from soilml.cli.progress import stage_progress
-    from training.export.stored_response import write_anew
 
     for name in names or WITH_SETS:
         print(f"{name}.onnx", flush=True)

@@ -29,7 +29,6 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/inference/posterior.py": {"threadpoolctl"},
     "soilml/log_import/stance_rows.py": {"scipy"},
     "soilml/systems/rim_stress/stress.py": {"scipy"},
-    "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/presentation.py": {"matplotlib"},
     "soilml/gap/notes.py": {"scipy"},
     "soilml/inference/evidence.py": {"scipy"},

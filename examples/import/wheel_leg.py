@@ -26,7 +26,7 @@ from soilml.physics.soils import Soil
 from soilml.quantities import Z_90, column
 from soilml.report.aligned_text import format_table
 from soilml.systems.wheel_legs.stances import GRAVITY, SpringLeg, simulate_stance
-from soilml.systems.wheel_legs.stride_relations import VIBRATION_SLIP
+from soilml.systems.wheel_legs.stride_relations import VIBRATION
 
 Floats = NDArray[np.float64]
 
@@ -117,7 +117,7 @@ def write_logs(folder: Path, seed: int = 1) -> tuple[list[Path], Truth]:
     })  # fmt: skip
     force = Model(FOOT)(each, Operating(slip=slip, load=LOAD))
     sigma = np.asarray(each.kphi) * 0.01 ** np.asarray(each.n)
-    a, b = VIBRATION_SLIP["linear"].line(each.friction_angle, sigma)
+    a, b = VIBRATION.line(each.friction_angle, sigma)
     truth = Truth(
         slip, np.asarray(force.torque), np.maximum((slip - a) / b, 0.0), np.asarray(force.sinkage)
     )

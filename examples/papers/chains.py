@@ -20,7 +20,7 @@ CHAINS = {
         "k_x 7.2 mm, M 1.43; slopes are those climbed",
     ),
     "climb": (
-        "rover.toml runs.csv --stress stress.csv --out {out}/climb/report",
+        "rover.toml runs.csv --stress stress.csv --report {out}/climb/report",
         "k_x 7.2 mm, steepest slope 13.2 degrees",
     ),
     "wheel-leg": (
@@ -40,6 +40,7 @@ def run() -> None:
     for name in sys.argv[1:] or CHAINS:
         folder = OUT / name
         shutil.rmtree(folder, ignore_errors=True)
+        print()
         if main(["example", name, str(folder), "--quiet"]) != 0:
             raise SystemExit(2)
         words, truth = CHAINS[name]

@@ -30,7 +30,7 @@ def run() -> None:
         if done.returncode != 0:
             sys.exit(f"{script}.py failed with status {done.returncode}")
     print("\n== All printed numbers beside the computed ones: soilml paper numbers", flush=True)
-    words = ["paper", "numbers", "--summary", "--out", str(OUT / "papers.csv")]
+    words = ["paper", "numbers", "--out", str(OUT / "papers.csv")]
     done = subprocess.run([sys.executable, "-m", "soilml", *words])
     print(f"\n{time.perf_counter() - started:.0f} s; pictures: {OUT}")
     sys.exit(done.returncode)

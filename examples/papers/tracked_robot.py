@@ -10,16 +10,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import linregress
 
-from soilml import Case, Model, simulate, soil
+from soilml import Case, Model, identify, simulate, soil
 from soilml.config.measurement_noise import Noise
+from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.papers.published import printed
 from soilml.papers.wang2018 import LEVEL, implied_points, plateau
-from soilml.systems.tracked_robot.group_identification import (
-    PARAMETERS,
-    GroupFits,
-    identify_groups,
-)
 from soilml.systems.tracked_robot.robot import (
     BEYOND_PEAK,
     GROUSERS,
@@ -46,9 +42,7 @@ def main() -> None:
     """Print the findings."""
     sensitivity_to_assumptions()
     grouser_gains()
-    case, groups = eight_groups()
-    fresh = simulate(case, np.linspace(0.04, 0.9, 18), WANG2018.load, seed=7)
-    regression_of_fresh_rows(case, groups, fresh)
+    eight_groups()
 
 
 def sensitivity_to_assumptions() -> None:
@@ -104,33 +98,41 @@ def grouser_gains() -> None:
         )
 
 
-def eight_groups() -> tuple[Case, GroupFits]:
+def eight_groups() -> None:
     """Simulate eight groups of pulls on the paper's sand with measurement noise, and fit them."""
     noise = {"drawbar_pull_N": Noise(constant=10.0, share=0.05)}
     case = Case(Model(WANG2018.track), soil("wang2018/sand"), PRIOR, noise)
     slips = np.linspace(0.05, 0.85, 10)
     tables = [simulate(case, slips, WANG2018.load, seed=2018 + k) for k in range(GROUPS)]
-    groups = identify_groups(case, tables)
+    groups = [identify(case, table, method="nonlinear") for table in tables]
+    names = ("slip", "load_N", "drawbar_pull_N")
+    rows = {name: np.concatenate([table[name] for table in tables]) for name in names}
+    pooled = identify(case, Table(rows), method="nonlinear")
+    left = {
+        name: float(np.mean([fit.remaining_fraction[name] for fit in groups])) for name in PRIOR
+    }
+    mean = np.mean([fit.values for fit in groups], axis=0)
     print("\nEight groups of ten pulls each, 5 % and 10 N noise, one load, five unknowns")
-    print("parameter       true     mean      std  prior std  prior remaining, a group  all rows")
-    for i, name in enumerate(PARAMETERS):
+    print("parameter       true     mean  prior std  prior remaining, a group  all rows")
+    for name, value in zip(groups[0].names, mean, strict=True):
         scale = UNITS.get(name, 1.0)
         true = float(getattr(case.soil, name))
         print(
-            f"{name:14s} {scale * true:7.4g}  {scale * groups.mean[i]:7.4g}  "
-            f"{scale * groups.std[i]:7.2g}  {scale * PRIOR[name].std:9.2g}  "
-            f"{groups.remaining_fraction[name]:22.0%}  "
-            f"{groups.pooled.remaining_fraction[name]:8.0%}"
+            f"{name:14s} {scale * true:7.4g}  {scale * value:7.4g}  "
+            f"{scale * PRIOR[name].std:9.2g}  {left[name]:22.0%}  "
+            f"{pooled.remaining_fraction[name]:8.0%}"
         )
-    weak = [name for name, left in groups.remaining_fraction.items() if left > 0.5]
+    weak = [name for name, share in left.items() if share > 0.5]
     print(f"hardly identified or not identified: {', '.join(weak)}")
-    return case, groups
+    fresh = simulate(case, np.linspace(0.04, 0.9, 18), WANG2018.load, seed=7)
+    average = case.with_values(dict(zip(groups[0].names, mean.tolist(), strict=True)))
+    predicted = simulate(average, fresh["slip"], fresh["load_N"])["drawbar_pull_N"]
+    regression_of_fresh_rows(predicted, fresh["drawbar_pull_N"])
 
 
-def regression_of_fresh_rows(case: Case, groups: GroupFits, fresh: object) -> None:
+def regression_of_fresh_rows(predicted: np.ndarray, measured: np.ndarray) -> None:
     """Regression of new measurements on the predictions of the groups' average."""
-    predicted, count = mean_prediction(case, groups, fresh), len(fresh)
-    line = linregress(predicted, fresh["drawbar_pull_N"])
+    line, count = linregress(predicted, measured), len(measured)
     r2 = line.rvalue**2
     book = printed("wang2018")
     n = implied_points(book["regression_r2"], book["regression_f"])
@@ -143,12 +145,6 @@ def regression_of_fresh_rows(case: Case, groups: GroupFits, fresh: object) -> No
         f"printed (points follow from r2 and F)   {book['regression_r2']:6.3f}  "
         f"{book['regression_f']:6.1f}  {book['regression_slope']:6.2f}  {n:6.1f}"
     )
-
-
-def mean_prediction(case: Case, groups: GroupFits, table: object) -> np.ndarray:
-    """Pull predicted by the average of the groups, N."""
-    soil_ = case.with_values(dict(zip(groups.names, groups.mean.tolist(), strict=True)))
-    return simulate(soil_, table["slip"], table["load_N"])["drawbar_pull_N"]
 
 
 if __name__ == "__main__":

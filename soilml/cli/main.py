@@ -63,8 +63,6 @@ SECTIONS: dict[str, dict[str, tuple[str, str]]] = {
         "train": (_GROUND + "train", "a trained file from data"),
         "compare": (_GROUND + "compare", "score trained files and fits on known soils"),
         "export c": (_GROUND + "export_c", "a trained file as C99 code"),
-        "export fusion": (_GROUND + "export_fusion", "the fusion of two files as C99 code"),
-        "export step": (_GROUND + "export_step", "one step of a stream as ONNX of fixed shapes"),
         "export slip": (_GROUND + "export_slip", "the slip filter of a rover as ONNX and C99"),
         "export soil": (_OWN + "export_soil", "a soil for Chrono, Gazebo, Isaac or a table"),
     },

@@ -23,7 +23,7 @@ COMMANDS = _RENAMED | {
         ("show", "", "models soils effects"),
         ("setup", "", "completion"),
         ("drive", "", "slip map"),
-        ("export", "export-", "c fusion step slip soil"),
+        ("export", "export-", "c slip soil"),
         ("paper", "", "climb sensor-wheel wheel-leg walk"),
     )
     for word in names.split()
@@ -31,14 +31,12 @@ COMMANDS = _RENAMED | {
 }
 #: Former names of options, by command.
 OPTIONS: Mapping[str, Mapping[str, str]] = {
-    "adapt": {"--soil": "--truth"},
     "bevameter": {"--json": "--out"},
     "drive slip": {"--json": "--out"},
     "estimate": {"--case": "--model"},
     "export c": {"--rows": "--step-rows"},
     "export slip": {"--soils": "--draws"},
     "export soil": {"--run": "--group"},
-    "export step": {"--rows": "--step-rows"},
     "paper numbers": {"--json": "--out"},
     "paper walk": {"--speed": "--angular-speed"},
     "plan next": {"--slips": "--slip", "--loads": "--load", "--radii": "--radius"},

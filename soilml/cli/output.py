@@ -33,17 +33,14 @@ def write_columns(
     out: str | None,
     picture: str | None = None,
     drawn: Picture | None = None,
-    others: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> None:
     """Write the columns to the CSV file `out`; without one, print them.
 
     picture: PNG file of `drawn`; None where the option was not given.
-    others: Columns of further CSV files.
     """
     files: dict[Path, Content] = {}
     if out is not None:
         files[Path(out)] = partial(save_columns, columns)
-    files |= {Path(name): partial(save_columns, table) for name, table in (others or {}).items()}
     if picture is not None and drawn is not None:
         files[Path(picture)] = drawn.save
     write_files(files)

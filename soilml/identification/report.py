@@ -70,19 +70,13 @@ def fit_report(fit: Fit, next_rows: Sequence[str] = (), title: str = "Soil") -> 
 
 
 def group_report(
-    found: Mapping[str, Fit],
-    failed: Mapping[str, str],
-    by: str,
-    title: str = "Soil by group",
-    mean: Fit | None = None,
+    found: Mapping[str, Fit], failed: Mapping[str, str], by: str, title: str = "Soil by group"
 ) -> Report:
-    """The report of fits by group of the rows, and of their mean; `failed` says why others fail."""
+    """The report of fits by group of the rows; `failed` says why others fail."""
     fits = sum(fit.fits for fit in found.values())
     verdict = f"The model fits the rows of {fits} of {len(found)} groups by {by}."
     if fits < len(found):
         verdict = f"{verdict[:-1]}: run `soilml gap`."
-    if mean is not None:
-        found = {**found, f"mean of {len(found)}": mean}
     whole = by_group({n: fit_report(f) for n, f in found.items()}, failed, by, verdict, title)
     return replace(whole, pictures=[_intervals(found).picture()])
 

@@ -106,7 +106,7 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
         )
     if metadata.get("soilml_kind") == ONE_STEP:
         raise ModelFileError(
-            f"{file} is one step of a stream, written by soilml export step for other programs; "
+            f"{file} is one step of a stream, written by an earlier soilml for other programs; "
             "needed is the file that it was made from"
         )
     _check_intact(file, content, metadata)

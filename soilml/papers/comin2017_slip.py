@@ -27,13 +27,11 @@ from soilml.systems.wheel_legs.resistive_force import GROUNDS
 from soilml.systems.wheel_legs.stances import SpringLeg, vibration_amplitude
 from soilml.systems.wheel_legs.stride_relations import (
     GRAVITY,
-    LINEAR,
     PRESSURE,
-    SIMPLIFIED,
-    SINKAGE,
+    SINKAGE_ERRORS,
     STIFFNESS,
-    TORQUE_SLIP,
-    VIBRATION_SLIP,
+    TORQUE_ERRORS,
+    VIBRATION_ERRORS,
 )
 from soilml.systems.wheel_legs.strides import HEAVY_AT, HEAVY_WHEEL
 
@@ -50,9 +48,12 @@ DROPS = np.deg2rad(np.linspace(4.0, 20.0, 9))
 FRICTION = math.radians(40.0)
 #: Standard deviations (%) of the errors of torque, vibration and sinkage, table VIII, all soils.
 STD = {
-    name: tuple(one.scatter[k] for one in (SIMPLIFIED, LINEAR, SINKAGE))
+    name: tuple(one.scatter[k] for one in (TORQUE_ERRORS, VIBRATION_ERRORS, SINKAGE_ERRORS))
     for k, name in enumerate(("friction", "stiffness"))
 }
+#: Variances of the slip by relations of torque and of vibration, table VI.
+TORQUE_SLIP = {"terramechanics": 0.074, "empirical": 0.005, "simplified": 0.018}
+VIBRATION_SLIP = {"planar": 0.015, "linear": 0.020}
 K_A = {"ssc-1": 0.024, "ssc-2": 0.017, "ssc-3": 0.021, "es-3": 0.022}  # Table I
 SIGMA = np.asarray([ground.normal_stiffness for ground in GROUNDS.values()])  # Pa
 
@@ -115,7 +116,7 @@ def vibration_fit(planar: bool) -> Fit:
 
 def fused_slip(torque: str, vibration: str) -> FusedEstimate:
     """Fused slip from torque and vibration, with the standard deviations of table VI (in %)."""
-    std = 100.0 * np.asarray([TORQUE_SLIP[torque].slip_std, VIBRATION_SLIP[vibration].slip_std])
+    std = 100.0 * np.asarray([TORQUE_SLIP[torque], VIBRATION_SLIP[vibration]]) ** 0.5
     return inverse_variance(np.zeros(2), std)
 
 
@@ -131,9 +132,9 @@ def efficiency(name: str) -> float:
 
 
 def constant_intercept() -> float:
-    """Mean intercept of the empirical model over the four soils of table I."""
-    a, _ = TORQUE_SLIP["empirical"].line(np.asarray(four_soils().friction_angle), SIGMA)
-    return float(a.mean())
+    """Mean intercept of the empirical model (table IV) over the four soils of table I."""
+    slope = (1.0 - np.asarray(four_soils().friction_angle)) / 0.58
+    return float(np.mean((SIGMA / PRESSURE + 0.7 - 20.928 * slope) / 15.997))
 
 
 def _coefficient(fit: Callable[[], Fit], part: str, index: int | None = None) -> float:
@@ -147,7 +148,7 @@ def _weight(torque: str, vibration: str) -> float:
 
 
 def _slip_gain(torque: str, vibration: str, index: int) -> float:
-    single = (TORQUE_SLIP[torque].slip_std, VIBRATION_SLIP[vibration].slip_std)[index]
+    single = float((TORQUE_SLIP[torque], VIBRATION_SLIP[vibration])[index] ** 0.5)
     return float(fused_slip(torque, vibration).std) - 100.0 * single
 
 

@@ -8,14 +8,12 @@ from functools import cache, partial
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.physics.effects import StressShift
 from soilml.physics.gears import Wheel
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import soil
 from soilml.systems.rim_stress import (
-    MohrCoulomb,
     SensingWheel,
     SteadyRun,
     StressProfile,
@@ -23,7 +21,7 @@ from soilml.systems.rim_stress import (
     bin_stress,
     simulate_readings,
 )
-from soilml.systems.rim_stress.force_balance import find_modulus, force_components, pull_under
+from soilml.systems.rim_stress.force_balance import WheelBalance
 from soilml.systems.rim_stress.stress import deconvolve
 
 #: Table I pairs its five slips with the five slopes of section IV.A, in order.
@@ -31,7 +29,6 @@ SLOPES = {0.11: 0.0, 0.18: 2.0, 0.29: 4.0, 0.39: 6.0, 0.80: 8.0}
 #: Shift of the exit towards the entry that leaves 30 of 70 degrees, rounded as in the effect.
 SHIFT = 0.57
 WHEEL, SAND = SensingWheel(noise=0.0), soil("nagatani2009/toyoura_sand")
-STRENGTH = MohrCoulomb(friction_angle=SAND.friction_angle, cohesion=SAND.cohesion)
 WEIGHT = 28.92
 
 
@@ -39,16 +36,9 @@ WEIGHT = 28.92
 def _through_sensors(slip: float) -> tuple[StressProfile, float]:
     """Stress and k_x (m) estimated through the sensors from an arc of 30 degrees with one k_x."""
     at = SteadyRun(slip=slip, weight=WEIGHT, slope=math.radians(SLOPES[slip]))
-    true = balanced_arc(math.radians(30.0), at, WHEEL, STRENGTH, float(SAND.shear_modulus))
+    true = balanced_arc(math.radians(30.0), at, WHEEL, SAND)
     profile = deconvolve(bin_stress(simulate_readings(true, WHEEL), WHEEL), WHEEL)
-    soil_ = float(SAND.cohesion), math.tan(SAND.friction_angle)
-    load, slope = WEIGHT * math.cos(float(at.slope)), math.sin(float(at.slope))
-
-    def pull(modulus: Floats) -> Floats:
-        parts = force_components(profile, slip, modulus, float(WHEEL.radius), float(WHEEL.width))
-        return np.asarray(pull_under(parts, load, *soil_))
-
-    return profile, find_modulus(pull, WEIGHT * slope)
+    return profile, WheelBalance.of(WHEEL, SAND).modulus(profile, at)
 
 
 def _modulus(slip: float) -> float:

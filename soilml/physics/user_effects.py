@@ -13,17 +13,16 @@ from typing import Any
 from soilml.errors import InputError
 from soilml.parameters import check, declared
 from soilml.physics.effects import EFFECTS
-from soilml.physics.effects.base import KINDS, STAGES, Effect, EffectCard, misspelt_stage
+from soilml.physics.effects.base import KINDS, STAGES, Effect
 from soilml.physics.operating_point import COVARIATES
 
 
 def load_effects(path: str | os.PathLike[str]) -> dict[str, type[Effect]]:
     """Run a Python file and return the effects that it defines, by name.
 
-    An effect is a frozen dataclass with a `name`, a card `about` and at least one stage of
-    `soilml.physics.effects.base.STAGES`, derived from `soilml.physics.effects.Effect`. Classes
-    whose names begin with an underscore are ignored. The file may do all that Python may: load only
-    what you would run.
+    An effect is a class derived from `soilml.Effect` with at least one stage, declared by
+    `soilml.effect`. Classes whose names begin with an underscore are ignored. The file may do all
+    that Python may: load only what you would run.
 
     path: The Python file.
 
@@ -45,7 +44,7 @@ def load_effects(path: str | os.PathLike[str]) -> dict[str, type[Effect]]:
         effects[cls.name] = cls
     if not effects:
         raise InputError(
-            f"{path}: no effect in it; one is a frozen dataclass with name, about and one of: "
+            f"{path}: no effect in it; one is a class under @effect(NAME, ...) with one of: "
             f"{', '.join(STAGES)}"
         )
     return effects
@@ -79,48 +78,36 @@ def _candidates(module: ModuleType) -> list[Any]:
         for value in vars(module).values()
         if isinstance(value, type) and value.__module__ == module.__name__
     ]
-    marks = ("about", *STAGES)
-    return [v for v in own if v.__name__[0] != "_" and any(hasattr(v, name) for name in marks)]
+    return [v for v in own if v.__name__[0] != "_" and any(hasattr(v, name) for name in STAGES)]
 
 
 def _fault(cls: Any) -> str:
     """What keeps a class from being an effect; empty where it is one."""
-    own_dataclass = vars(cls).get("__dataclass_params__")  # not that of what it derives from
-    if own_dataclass is None or not own_dataclass.frozen:
-        return "an effect is decorated by @dataclass(frozen=True, kw_only=True)"
     if not issubclass(cls, Effect):
-        return misspelt_stage(cls) or f"derive it from soilml.Effect: class {cls.__name__}(Effect)"
+        return f"derive it from soilml.Effect: class {cls.__name__}(Effect)"
+    if "about" not in vars(cls):
+        return "declare it: write @effect(NAME, ...) above the class"
     if not any(cls.overrides(name) for name in STAGES):
         return f"it acts on nothing; it needs one of the methods {', '.join(STAGES)}"
-    if not isinstance(getattr(cls, "name", None), str):
-        return 'name is missing; write name: ClassVar[str] = "my-effect"'
-    if not re.fullmatch(r"[a-z][a-z0-9_-]*", cls.name):
-        return f"name is {cls.name!r}; it takes lower-case letters, digits and hyphens"
-    about = getattr(cls, "about", None)
-    if not isinstance(about, EffectCard):
-        return "about is missing; it is a soilml.physics.effects.EffectCard"
+    name, about = cls.name, cls.about
+    if not re.fullmatch(r"[a-z][a-z0-9_-]*", name):
+        return f"name is {name!r}; it takes lower-case letters, digits and hyphens"
     if about.kind not in KINDS:
-        return f"about.kind is {about.kind!r}; there are: {', '.join(KINDS)}"
+        return f"kind is {about.kind!r}; there are: {', '.join(KINDS)}"
     if unknown := [need for need in (*about.needs, *about.uses) if need not in COVARIATES]:
-        return f"about.needs or uses has {unknown[0]!r}; there are: {', '.join(COVARIATES)}"
-    return _fault_of_size(cls, about)
-
-
-def _fault_of_size(cls: Any, about: EffectCard) -> str:
-    """What is wrong with the parameters of an effect; empty where nothing is."""
+        return f"needs or uses has {unknown[0]!r}; there are: {', '.join(COVARIATES)}"
     try:
-        parameters = declared(cls)
-        neutral = cls()
+        parameters, neutral = declared(cls), cls()
     except (NameError, TypeError) as error:
         return f"its fields need types that exist and neutral defaults: {error}"
     if not about.reference:
-        return "about.reference is empty; its first key is the parameter that is the effect's size"
+        return "reference is empty; its first key is the parameter that is the effect's size"
     if unknown := [key for key in about.reference if key not in parameters]:
         there = ", ".join(parameters) or "none, they are fields: Annotated[Real, Parameter(...)]"
-        return f"about.reference has {unknown[0]!r}; its parameters are: {there}"
+        return f"reference has {unknown[0]!r}; its parameters are: {there}"
     try:
         check(neutral)
-        check(cls(**about.reference), "about.reference ")
+        check(cls(**about.reference), "reference ")
     except InputError as error:
         return str(error)
     return ""

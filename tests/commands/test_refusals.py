@@ -163,7 +163,6 @@ LINES = {
     "pull model.toml runs.csv --by run --picture p.png": "--picture draws one soil",
     "pull model.toml runs.csv --from good.onnx --exact-model": "--exact-model applies to the rows",
     "bevameter runs.csv --format json -o soil.toml": "--format json and --out soil.toml differ",
-    "paper climb rover.toml runs.csv --stress runs.csv -o o.json": "is the name of a file",
 }
 
 

@@ -8,7 +8,7 @@ from console import printed, refused, rows_of
 
 from soilml import soil
 from soilml.cli import main
-from soilml.systems.rim_stress import MohrCoulomb, SensingWheel, SteadyRun, balanced_arc
+from soilml.systems.rim_stress import SensingWheel, SteadyRun, balanced_arc
 
 MODEL = """\
 [gear]
@@ -25,11 +25,10 @@ SLOPES = {"flat": (0.11, 0.0), "up4": (0.29, math.radians(4.0)), "up6": (0.39, m
 def files(workplace):
     """A wheel of k_x 7.2 mm on three slopes, its stress half of the true one."""
     sand = soil("nagatani2009/toyoura_sand")
-    strength = MohrCoulomb(friction_angle=sand.friction_angle, cohesion=sand.cohesion)
     runs, stress = "run,slip,slip_std,load_N,slope_rad\n", "run,angle_rad,normal_Pa\n"
     for name, (slip, slope) in SLOPES.items():
         at = SteadyRun(slip=slip, weight=28.92, slope=slope)
-        true = balanced_arc(math.radians(30.0), at, SensingWheel(), strength, 0.0072)
+        true = balanced_arc(math.radians(30.0), at, SensingWheel(), sand)
         runs += f"{name},{slip},0.01,28.92,{slope}\n"
         for angle, normal in zip(true.angle, 0.5 * true.normal, strict=True):
             stress += f"{name},{angle:.12g},{normal:.12g}\n"

@@ -51,7 +51,7 @@ WORDS = {
 #: Commands whose tables have tests of their own, or that print none.
 ELSEWHERE = {
     *("init", "example", "setup completion", "serve", "import", "generate", "train", "adapt"),
-    *("compare", "plan runs", "export c", "export fusion", "export step", "export slip"),
+    *("compare", "plan runs", "export c", "export slip"),
     "export soil",  # in the units of the program that it writes for
     *("drive slip", "drive map", "paper climb", "paper wheel-leg", "paper sensor-wheel"),
     "paper track",

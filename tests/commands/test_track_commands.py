@@ -1,12 +1,11 @@
-"""A tracked robot from the shell: how it stands in the soil, and its soil as a mean of groups."""
+"""A tracked robot from the shell: how it stands in the soil, and its soil from the log of pulls."""
 
-import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 from console import rows_printed
 
-from soilml import read_case, simulate
 from soilml.cli import main
 
 MODEL = """\
@@ -47,24 +46,17 @@ def test_the_shares_carry_the_load(folder, capsys):
     assert (folder / "t.png").read_bytes().startswith(b"\x89PNG")
 
 
-MEAN = ["identify", "m.toml", "runs.csv", "--method", "nonlinear", "--by", "run", "--mean"]
-
-
-@pytest.mark.slow
-def test_the_mean_of_groups(folder, capsys):
-    case, slip = read_case("m.toml"), np.linspace(0.05, 0.85, 8)
-    text = "run,slip,load_N,drawbar_pull_N\n"
-    for seed in range(4):
-        pull = simulate(case, slip, 638.0, seed=seed)["drawbar_pull_N"]
-        text += "".join(f"g{seed},{s},638,{p}\n" for s, p in zip(slip, pull, strict=True))
-    (folder / "runs.csv").write_text(text)
-    assert main([*MEAN, "--report", "found"]) == 0
-    said = capsys.readouterr().out
-    content = json.loads((folder / "found" / "report.json").read_text())
-    each = [run["parameters"]["friction_angle"]["value"] for run in content["runs"].values()]
-    own = content["mean"]["parameters"]["friction_angle"]
-    assert len(each) == 4 and own["value"] == pytest.approx(np.mean(each))
-    assert abs(own["value"] - 0.4363) < 3.0 * own["std"]
-    assert "run mean of 4" in said
-    page = (folder / "found" / "report.html").read_text()
-    assert "run mean of 4" in page
+def test_the_log_of_the_example_gives_the_soil_that_was_put_in(workplace, capsys):
+    """Friction angle 25 degrees, shear modulus 45.1 mm; lasers that read to a millimetre."""
+    assert main(["example", "track", ".", "--quiet"]) == 0
+    command = ["paper", "track", "model.toml", "log.csv", "--mass", "130", "--spacing", "0.6"]
+    rows = rows_printed([*command, "--picture", "t.png", "--report", "page"], capsys)
+    assert len(rows) == 7
+    for row in rows:
+        read, said = (float(row[name]) for name in ("drawbar_pull_N", "pull_predicted_N"))
+        assert said == pytest.approx(read, abs=4.0 * float(row["drawbar_pull_N_std"]))
+        sunk, deep = (float(row[f"rear_sinkage{end}_m"]) for end in ("", "_predicted"))
+        assert sunk == pytest.approx(deep, abs=2e-4)
+    assert Path("t.png").read_bytes().startswith(b"\x89PNG")
+    page = Path("page/report.html").read_text()
+    assert "Line of the belt" in page

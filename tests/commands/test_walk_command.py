@@ -33,6 +33,7 @@ def test_a_row_for_each_combination_and_firm_ground_carries_better(tmp_path, cap
         (["--mass", "-1"], "needed is 0.01 to 100000 kg"),
         (["--slip", "0,50"], "--slip is 50; needed is 1 - v/(r omega)"),
         (["--stiffness", "1e6", "--offset"], "has no stress at the surface"),
+        (["--stiffness", "1e6"], "a picture needs three or more values"),
         (["--stiffness", "1e5:1e6:200", "--legs", "3:6:4"], "800 walks; at most 400"),
     ],
 )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from console import refused, rows_printed
 
-from soilml.systems.wheel_legs.stride_relations import TORQUE_SLIP, VIBRATION_SLIP, soil_of_sinkage
+from soilml.systems.wheel_legs.stride_relations import TORQUE, VIBRATION, soil_of_sinkage
 
 HEAD = "run,slip,torque_Nm,vibration_m_s2,sinkage_m\n"
 
@@ -12,8 +12,7 @@ HEAD = "run,slip,torque_Nm,vibration_m_s2,sinkage_m\n"
 @pytest.fixture
 def strides(tmp_path):
     """Two soils; the torque of the first is that of the printed model at 40 degrees."""
-    angle, stiffness = np.deg2rad(40.0), 11300.0
-    a, b = TORQUE_SLIP["empirical"].line(angle, stiffness)
+    a, b = TORQUE.line(np.deg2rad(40.0), 11300.0)
     lines = [f"a,{slip},{(slip - a) / b},,0.01\n" for slip in (0.1, 0.3, 0.5)]
     file = tmp_path / "strides.csv"
     file.write_text(HEAD + "".join(lines) + "b,0.2,,,0.02\n")
@@ -21,12 +20,11 @@ def strides(tmp_path):
 
 
 def test_each_sensor_and_the_fused_soil(strides, capsys):
-    command = ["paper", "wheel-leg", str(strides), "--by", "run", "--torque-model", "empirical"]
+    command = ["paper", "wheel-leg", str(strides), "--by", "run"]
     found = {(row["run"], row["sensor"]): row for row in rows_printed(command, capsys)}
     assert set(found) == {("a", "torque"), ("a", "sinkage"), ("a", "fused"), ("b", "sinkage")}
     torque, sinkage, fused = (found["a", name] for name in ("torque", "sinkage", "fused"))
     assert float(torque["friction_angle_rad"]) == pytest.approx(np.deg2rad(40.0), abs=1e-6)
-    assert float(torque["normal_stiffness_Pa"]) == pytest.approx(11300.0, rel=1e-6)
     expected = soil_of_sinkage(0.01).mean[0]
     assert float(sinkage["friction_angle_rad"]) == pytest.approx(expected)
     weight = 9.0**2 / (9.0**2 + 14.0**2)  # eq. 30, with the scatter of table VIII
@@ -41,20 +39,19 @@ def test_each_sensor_and_the_fused_soil(strides, capsys):
 
 def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
     angle, stiffness = np.deg2rad(42.77), 13100.0 + 10500.0  # SSC-2 of table I
-    a, b = TORQUE_SLIP["empirical"].line(angle, stiffness)
-    c, d = VIBRATION_SLIP["planar"].line(angle, stiffness)
+    a, b = TORQUE.line(angle, stiffness)
+    c, d = VIBRATION.line(angle, stiffness)
     lines = [f"a,{s},{(s - a) / b},{(s - c) / d},\n" for s in (0.1, 0.3)]
     file, picture = tmp_path / "strides.csv", tmp_path / "slip.png"
     file.write_text(HEAD + "".join(lines) + f"b,,,{(0.4 - c) / d},\n")
-    command = ["paper", "wheel-leg", str(file), "--torque-model", "empirical"]
-    command += ["--vibration-model", "planar", "--known"]
+    command = ["paper", "wheel-leg", str(file), "--known"]
     found = rows_printed([*command, "ssc-2", "--picture", picture], capsys)
     for row, slip in zip(found, (0.1, 0.3, 0.4), strict=True):
         for name in ("slip_by_torque", "slip_by_vibration", "slip"):
             assert row[name] == "" or float(row[name]) == pytest.approx(slip, abs=2e-4)
     assert found[2]["slip_by_torque"] == found[2]["slip_measured"] == ""
-    assert float(found[0]["slip_std"]) == pytest.approx((1 / 0.005 + 1 / 0.015) ** -0.5)  # eq. 26
-    assert float(found[2]["slip_std"]) == pytest.approx(0.015**0.5)
+    assert float(found[0]["slip_std"]) == pytest.approx((1 / 0.018 + 1 / 0.02) ** -0.5)  # eq. 26
+    assert float(found[2]["slip_std"]) == pytest.approx(0.02**0.5)
     assert picture.read_bytes().startswith(b"\x89PNG")
     again = rows_printed([*command, "42.77,23600"], capsys)
     assert float(again[1]["slip"]) == pytest.approx(float(found[1]["slip"]), abs=1e-3)
@@ -63,7 +60,6 @@ def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("text", "options", "expected"),
     [
-        ("run,slip,torque_Nm\na,0.2,1.1\n", ["--torque-model", "x"], "no slip model 'x'"),
         ("run,slip\na,0.2\n", [], "nothing was measured"),
         ("run,slip,torque_Nm\na,0.2,\n", [], "nothing was measured"),
         ("run,slip,sinkage_m\na,0.2,-0.01\n", [], "a midstance sinkage must be above 0 m"),

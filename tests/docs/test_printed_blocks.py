@@ -84,7 +84,7 @@ def test_each_small_run_is_of_a_script_of_a_page_and_is_recorded():
 
 #: Commands that compute for half a minute; tests/papers compute each number of the first.
 LONG = (
-    "python -m soilml paper numbers --summary",
+    "python -m soilml paper numbers",
     "python -m soilml pull examples/rover/rover.toml examples/rover/runs.csv --out build/rover.csv",
     "python examples/map/compare.py",
 )

@@ -20,6 +20,7 @@ from soilml.papers.published import (
     printed_numbers,
     read_chapter,
 )
+from soilml.papers.report import number_report
 
 ROWS = list(printed_numbers())
 EVERY = [chapter for name in PAPERS for chapter in CHAPTERS.get(name, (name,))]
@@ -69,15 +70,16 @@ def test_an_order_that_another_choice_turns_round_depends_on_it():
 
 
 def test_the_page_has_the_counts_of_the_rows():
-    """What `soilml paper numbers --summary` printed into the page; it takes too long to run."""
+    """What `soilml paper numbers` printed into the page; it takes too long to run."""
     counts = count_statuses(CLAIMED)
-    block = re.search(r"paper numbers --summary.*?```text\n(.*?)```", PAGE.read_text(), re.DOTALL)[
+    block = re.search(r"soilml paper numbers \|.*?```text\n(.*?)```", PAGE.read_text(), re.DOTALL)[
         1
     ]
     for code in set(STATUSES) - {"wrong"}:
+        said = code.replace("_", " ")
         each = [numbers[code] for numbers in counts.values()]
-        line = next(line for line in block.splitlines() if line.startswith(STATUSES[code]))
-        assert [int(n) for n in line.removeprefix(STATUSES[code]).split()] == [*each, sum(each)]
+        line = next(line for line in block.splitlines() if line.startswith(said))
+        assert [int(n) for n in line.removeprefix(said).split()] == [*each, sum(each)]
 
 
 @pytest.mark.parametrize("chapter", EVERY)
@@ -94,13 +96,21 @@ def test_a_chapter_is_complete(chapter):
 def test_the_terminal_shows_computed_numbers_and_the_others_by_reason(capsys):
     assert main(["paper", "numbers", "nagatani2009"]) == 0
     short = capsys.readouterr()
-    assert main(["paper", "numbers", "nagatani2009", "--all"]) == 0
+    assert main(["paper", "numbers", "nagatani2009", "-v"]) == 0
     every = capsys.readouterr()
     rows = [row for row in ROWS if row.paper == "nagatani2009"]
     # a long text goes on in the next line of its column
     whole, some = (" ".join(found.out.split()) for found in (every, short))
-    assert all(f"{row.what} ({row.source})" in whole for row in rows)
     computed = [row for row in rows if row.claimed not in ("given", "not_computed")]
     assert all(f"{row.what} ({row.source})" in some for row in computed)
+    assert all(row.reason in whole for row in rows if row.claimed != "given")
     given = [row for row in rows if row.claimed == "given"]
-    assert f"{len(given)} given, kept as printed: wheel radius, " in short.out
+    assert f"{len(given)} given, kept as printed: wheel radius, " in whole
+
+
+def test_the_report_of_all_papers_counts_what_rows_claim():
+    report = number_report(CLAIMED)
+    assert report.verdict.startswith("5 of 346 printed numbers") and report.tone == "good"
+    assert len(report.tables) == 1 + len(PAPERS)
+    wrong = number_report([*CLAIMED, dataclasses.replace(CLAIMED[0], agrees=False)])
+    assert wrong.tone == "bad" and "first radius" in wrong.verdict

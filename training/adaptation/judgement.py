@@ -21,7 +21,7 @@ from soilml.onboard.estimator import Estimator
 from soilml.onboard.table_estimates import joint_readings
 from soilml.quantities import CHANNELS, column
 
-#: Numbers of first rows from which the soil is estimated, as far as a run has more rows.
+#: Numbers of first rows from which the soil is estimated: the most of which a run has more rows.
 FIRST_ROWS = (4, 8, 16)
 #: Channels that the board may not read, so that both files estimate from torque alone.
 WITHHELD = (column("drawbar_pull"), column("sinkage"))
@@ -49,13 +49,10 @@ class RunPrediction:
     mean, std : dict of ndarray
         Of the readings by column, (rows,); NaN without equilibrium. The deviation is that of soil,
         noise and declared error of the model.
-    estimate : Estimate
-        The soil that it follows from.
     """
 
     mean: dict[str, Floats]
     std: dict[str, Floats]
-    estimate: Estimate
 
 
 @dataclass(frozen=True)
@@ -84,14 +81,9 @@ class JudgedRun:
 
 @dataclass(frozen=True)
 class Judgement:
-    """Both files on all runs that were kept back.
-
-    `soil_error` has, where the soil is known, the root mean square error of each estimated
-    parameter before and after, in its SI unit.
-    """
+    """Both files on all runs that were kept back."""
 
     runs: tuple[JudgedRun, ...]
-    soil_error: dict[str, tuple[float, float]]
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -99,26 +91,17 @@ class Judgement:
         found = {key for run in self.runs for key in run.scores}
         return tuple(column(n) for n in CHANNELS if column(n) in found)
 
-    def figures(
-        self, first_rows: int | None = None
-    ) -> dict[str, tuple[ChannelScore, ChannelScore]]:
-        """By column the scores before and after, the mean over runs.
-
-        Each run counts with the most first rows that it was judged from, or with `first_rows`.
-        """
-        most = {run.run: run.first_rows for run in self.runs}  # in ascending order
-        wanted = most if first_rows is None else dict.fromkeys(most, first_rows)
-        runs = [run for run in self.runs if run.first_rows == wanted[run.run]]
+    def figures(self) -> dict[str, tuple[ChannelScore, ChannelScore]]:
+        """By column the scores before and after, the mean over runs."""
         found = {}
         for key in self.channels:
-            if pairs := [run.scores[key] for run in runs if key in run.scores]:
-                before, after = zip(*pairs, strict=True)
-                found[key] = _mean(before), _mean(after)
+            before, after = zip(*(r.scores[key] for r in self.runs if key in r.scores), strict=True)
+            found[key] = _mean(before), _mean(after)
         return found
 
-    def error(self, first_rows: int | None = None) -> tuple[float, float]:
+    def error(self) -> tuple[float, float]:
         """Root mean square over channels of the errors of `figures` before and after."""
-        pairs = list(self.figures(first_rows).values())
+        pairs = self.figures().values()
         before, after = (
             float(np.sqrt(np.mean([pair[i].error ** 2 for pair in pairs]))) for i in (0, 1)
         )
@@ -126,79 +109,54 @@ class Judgement:
 
     @property
     def ratio(self) -> float:
-        """Error after over error before, from the most first rows; below 1 the adapted is better.
-
-        From few rows of one load the soil is uncertain, and so is the error of either file.
-        """
+        """Error after over error before; below 1 the adapted file is better."""
         before, after = self.error()
         return after / before if before > 0.0 else np.inf
 
-    @property
-    def lengths(self) -> tuple[int, ...]:
-        """The numbers of first rows that there are."""
-        return tuple(sorted({run.first_rows for run in self.runs}))
-
 
 def judge(
-    kept_back: Table,
-    before: BoardCandidate,
-    after: BoardCandidate,
-    truth: Mapping[str, float] | None = None,
-    *,
-    first_rows: Sequence[int] = FIRST_ROWS,
-    seed: int = 0,
+    kept_back: Table, before: BoardCandidate, after: BoardCandidate, *, seed: int = 0
 ) -> Judgement:
     """Judge two files on runs that neither was made from.
 
-    From the torque of the first k rows of a run each file estimates the soil; its model predicts
-    every measured channel of the later rows, averaged over the estimate. Rows are taken in the
-    order of `time_s`, or of the table.
+    From the torque of the first rows of a run, as many of `FIRST_ROWS` as it has more of, each file
+    estimates the soil; its model predicts every measured channel of the later rows, averaged over
+    the estimate. Rows are taken in the order of `time_s`, or of the table.
 
     kept_back: Rows of whole runs.
-    truth: Soil parameters by name, where they are known; columns of the table come first.
     seed: Of the soils that are drawn from an estimate.
 
-    Raises `InputError` where no run has more rows than the fewest first ones, and where no later
-    row can be predicted.
+    Raises `InputError` where no later row can be predicted.
     """
-    check_lengths(kept_back, first_rows)
     scale = {
         key: size
         for key in map(column, CHANNELS)
         if key in kept_back and (size := range_with_zero(kept_back[key])) > 0.0
     }
     judged: list[JudgedRun] = []
-    errors: dict[str, list[tuple[float, float]]] = {}
     for name, rows in kept_back.groups("run"):
         rows = _drivable(rows)
-        for k in (k for k in sorted(first_rows) if k < len(rows)):
+        k = max((k for k in FIRST_ROWS if k < len(rows)), default=0)
+        if k:
             first, later = rows.rows(np.arange(k)), rows.rows(np.arange(k, len(rows)))
             pair = [predict_run(c, first, later, scale, seed) for c in (before, after)]
             judged.append(_judged(name, k, later, pair, scale))
-            names = {n: column(n) for n in pair[0].estimate.names}
-            true = {n: float(np.mean(rows[key])) for n, key in names.items() if key in rows}
-            known = dict(truth or {}) | {n: x for n, x in true.items() if np.isfinite(x)}
-            for i, parameter in enumerate(pair[0].estimate.names):
-                if parameter in known:
-                    off = [float(p.estimate.mean[i]) - known[parameter] for p in pair]
-                    errors.setdefault(parameter, []).append((off[0], off[1]))
     judged = [run for run in judged if run.scores]
     if not judged:
         raise InputError(
             f"{kept_back.source}: no later row of a run that is kept back can be predicted by both "
             "files: a file cannot be judged"
         )
-    rms = {name: tuple(np.sqrt(np.mean(np.square(own), axis=0))) for name, own in errors.items()}
-    return Judgement(tuple(judged), {name: (float(b), float(a)) for name, (b, a) in rms.items()})
+    return Judgement(tuple(judged))
 
 
-def check_lengths(kept_back: Table, first_rows: Sequence[int] = FIRST_ROWS) -> None:
+def check_lengths(kept_back: Table) -> None:
     """Raise `InputError` where no run has more rows than the fewest first ones."""
     most = max(len(_drivable(rows)) for _, rows in kept_back.groups("run"))
-    if most <= min(first_rows):
+    if most <= min(FIRST_ROWS):
         raise InputError(
             f"{kept_back.source}: a run that is kept back has {most} rows with slip above 0 and "
-            f"torque; needed are more than {min(first_rows)}, from which the others are predicted"
+            f"torque; needed are more than {min(FIRST_ROWS)}, from which the others are predicted"
         )
 
 
@@ -235,7 +193,7 @@ def predict_run(
         noise = np.nan_to_num(positive_std(candidate.case, later, key))
         error = _model_error(case, name, later, scale[key])
         std[key] = np.sqrt(spread**2 + noise**2 + error**2)
-    return RunPrediction(mean, std, estimate)
+    return RunPrediction(mean, std)
 
 
 def _model_error(case: Case, channel: str, rows: Table, size: float) -> Floats:

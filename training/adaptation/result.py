@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.parameters import declared
-from soilml.physics.soils import Soil
 from soilml.quantities import Z_90
 from soilml.remarks import Remark
 from soilml.report.figure_style import AFTER, BEFORE
@@ -20,7 +18,6 @@ from soilml.report.numbers import (
     channel_unit,
     decimal,
     format_quantity,
-    parameter_name,
     pretty,
     significant,
     with_unit,
@@ -114,7 +111,7 @@ class AdaptReport(Result):
             kind="adapt",
             verdict=self.sentence,
             lines=[f"{self.gap_status}: {self.gap_sentence}"] if trained else [],
-            tables=[] if judged is None else _tables(self, judged),
+            tables=[] if judged is None else [_table(self)],
             pictures=[] if judged is None else [_picture(judged)],
             remarks=self.remarks,
             next_steps=self._next_steps(),
@@ -142,24 +139,20 @@ class AdaptReport(Result):
         return ["see gap/report.html, and measure the runs of gap/next_runs.csv"]
 
     def frame_columns(self) -> dict[str, Any]:
-        """A row for each channel and number of first rows: errors and log scores of both files.
+        """A row for each channel: errors and log scores of both files.
 
         Raises `InputError` where no file was judged.
         """
         if self.judgement is None:
             raise InputError("no file was judged, so that there are no figures")
-        rows = [
-            (key, k, before, after)
-            for k in self.judgement.lengths
-            for key, (before, after) in self.judgement.figures(k).items()
-        ]
+        figures = self.judgement.figures()
+        pairs = list(figures.values())
         return {
-            "predicted": [row[0] for row in rows],
-            "first_rows": [row[1] for row in rows],
-            "error_before": [row[2].error for row in rows],
-            "error_after": [row[3].error for row in rows],
-            "log_score_before": [row[2].log_score for row in rows],
-            "log_score_after": [row[3].log_score for row in rows],
+            "predicted": list(figures),
+            "error_before": [before.error for before, _ in pairs],
+            "error_after": [after.error for _, after in pairs],
+            "log_score_before": [before.log_score for before, _ in pairs],
+            "log_score_after": [after.log_score for _, after in pairs],
         }
 
     def as_json(self) -> dict[str, Any]:
@@ -182,55 +175,34 @@ class AdaptReport(Result):
 
 def _judgement_json(judgement: Judgement) -> dict[str, Any]:
     before, after = judgement.error()
-    units = {name: parameter.unit for name, parameter in declared(Soil).items()}
     return {
         "error_ratio": judgement.ratio,
         "error": {"before": before, "after": after},
-        "by_first_rows": {
-            str(k): {
-                key: {"before": vars(old), "after": vars(new)}
-                for key, (old, new) in judgement.figures(k).items()
-            }
-            for k in judgement.lengths
-        },
-        "soil_error": {
-            name: {"before": b, "after": a, "unit": units.get(name, "")}
-            for name, (b, a) in judgement.soil_error.items()
+        "channels": {
+            key: {"before": vars(old), "after": vars(new)}
+            for key, (old, new) in judgement.figures().items()
         },
     }
 
 
-def _tables(found: AdaptReport, judged: Judgement) -> list[ReportTable]:
-    """Errors and log scores by channel and number of first rows; errors of a known soil."""
+def _table(found: AdaptReport) -> ReportTable:
+    """Errors and log scores by channel."""
     own = found.frame_columns()
-    tables = [
-        ReportTable(
-            "Later rows, predicted from the first",
-            [
-                Column("predicted", [channel_name(key) for key in own["predicted"]]),
-                Column("first rows", own["first_rows"]),
-                Column("error before", own["error_before"], "share", digits=2),
-                Column("error after", own["error_after"], "share", digits=2),
-                Column("log score before", own["log_score_before"], digits=3),
-                Column("after", own["log_score_after"], digits=3),
-            ],
-        )
-    ]
-    if judged.soil_error:
-        units = [declared(Soil)[name].unit for name in judged.soil_error]
-        before, after = ([pair[k] for pair in judged.soil_error.values()] for k in (0, 1))
-        columns = [
-            Column("soil", [parameter_name(name) for name in judged.soil_error]),
-            Column("error before", before, units, digits=3),
-            Column("after", after, units, digits=3, sizes=before),
-        ]
-        tables.append(ReportTable("Estimates against the known soil", columns))
-    return tables
+    return ReportTable(
+        "Later rows, predicted from the first",
+        [
+            Column("predicted", [channel_name(key) for key in own["predicted"]]),
+            Column("error before", own["error_before"], "share", digits=2),
+            Column("error after", own["error_after"], "share", digits=2),
+            Column("log score before", own["log_score_before"], digits=3),
+            Column("after", own["log_score_after"], digits=3),
+        ],
+    )
 
 
 def _picture(judged: Judgement) -> Picture:
     """A panel for each channel."""
-    count, k = len(judged.channels), judged.lengths[-1]
+    count, k = len(judged.channels), max(run.first_rows for run in judged.runs)
     before, after = (format_quantity(x, "share", digits=2) for x in judged.error())
     return Picture(
         "Runs kept back",
@@ -240,16 +212,15 @@ def _picture(judged: Judgement) -> Picture:
         (PANEL[0] * count, PANEL[1]),
         f"{', '.join(map(channel_name, judged.channels))} over slip, measured and predicted by "
         f"both files; errors of {before} before and {after} after",
-        f"The soil was estimated from the torque of the first {k} rows of a run. Points: the later "
-        "rows as measured. Lines: as predicted by the old file (orange, dashed) and by the adapted "
-        "one (blue, with its 90 % band).",
+        f"The soil was estimated from the torque of the first rows of a run, {k} at most. Points: "
+        "the later rows as measured. Lines: as predicted by the old file (orange, dashed) and by "
+        "the adapted one (blue, with its 90 % band).",
     )
 
 
 def _draw(judged: Judgement, axes: Any) -> None:
-    runs = [run for run in judged.runs if run.first_rows == judged.lengths[-1]][:MOST_RUNS]
     for panel, key in zip(np.asarray(axes).flat, judged.channels, strict=True):
-        _draw_channel(panel, key, runs)
+        _draw_channel(panel, key, judged.runs[:MOST_RUNS])
 
 
 def _draw_channel(axes: Any, key: str, runs: Sequence[JudgedRun]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -77,7 +77,6 @@ def adapt(
     *,
     suspected: bool = False,
     against: str | os.PathLike[str] | None = None,
-    truth: Mapping[str, float] | None = None,
     rows: int = ROWS,
     seed: int = 0,
     workers: int | None = None,
@@ -113,9 +112,6 @@ def adapt(
     against : path, optional
         A model file for this wheel, or a released one by name, in the place of one trained on the
         model as it was.
-    truth : mapping, optional
-        True soil parameters by name, SI, where they are known; estimates are compared with them.
-        Columns of the table such as `cohesion_Pa` count as well.
     rows : int
         Synthetic rows that each file is trained on.
     seed : int
@@ -216,7 +212,7 @@ def adapt(
                 after = BoardCandidate(with_sensors_of(Estimator.load(file), new), new)
                 exact = with_exact_model(earlier)  # the old file is judged by its better answer
                 judgements = [
-                    judge(split.kept_back, BoardCandidate(answer, own), after, truth, seed=seed)
+                    judge(split.kept_back, BoardCandidate(answer, own), after, seed=seed)
                     for answer in ([earlier] if exact is earlier else [earlier, exact])
                 ]
                 judgement = max(judgements, key=lambda one: one.ratio)

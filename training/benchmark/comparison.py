@@ -28,7 +28,6 @@ from soilml.numerics.prior import Prior
 from soilml.onboard.estimator import Estimator
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
-from soilml.processes import usable_cores
 from soilml.quantities import column
 from soilml.remarks import Remark
 from training.benchmark.methods import (
@@ -43,9 +42,7 @@ Progress = Callable[[str, int, int], None]
 
 #: Most sets of one design that are scored, and how many of these the slower analytic methods get.
 MAX_SETS, ANALYTIC_SETS = 2000, 120
-#: Wall time, s, that the analytic methods take about where no number of sets is asked for, the
-#: sets of each that tell how long one takes, and the fewest that are scored.
-ANALYTIC_SECONDS, PILOT, LEAST = 75.0, 4, 8
+ANALYTIC_SECONDS = 75.0  # Wall time that the analytic methods take about
 #: Fewest sets of a design that are scored: the standard error of 90 % coverage is then 7 %.
 MIN_SETS = 20
 #: Loads of a set that spread by less than this share of their mean count as one load.
@@ -65,7 +62,7 @@ class MethodResult:
     method: Method
     priors: tuple[Prior, ...]
     truth: Floats  # (n, q) SI units
-    estimates: Floats  # (n, 5, q) as `Method.estimate`
+    estimates: Floats  # (n, 3, q) as `Method.estimate`
     seconds: float  # Mean wall time of an estimate
     limit_error: Floats | None = None  # (m, q) of the Bayes limit on the first m of the design
 
@@ -104,9 +101,10 @@ class MethodResult:
         """RMSE (q,) over the prior's standard deviation."""
         return np.asarray(self.rmse / [p.std for p in self.priors])
 
-    def coverage(self, level: int) -> Floats:
-        """Coverage (q,) of the method's 50 or 90 % intervals, of the sets answered."""
-        ends = self.estimates[:, 1:3] if level == 50 else self.estimates[:, 3:5]
+    @property
+    def coverage(self) -> Floats:
+        """Coverage (q,) of the method's 90 % intervals, of the sets answered."""
+        ends = self.estimates[:, 1:]
         finite = np.isfinite(ends).all(axis=1)
         inside = (self.truth >= ends[:, 0]) & (self.truth <= ends[:, 1]) & finite
         count = finite.sum(axis=0)
@@ -198,7 +196,6 @@ def compare(
     sets: Sequence[Table],
     estimators: Mapping[str, Estimator],
     progress: Progress = lambda text, done, total: None,
-    analytic_sets: int | None = None,
     most_sets: int = MAX_SETS,
 ) -> list[MethodResult]:
     """Score the prior, model files and analytic methods on sets of readings.
@@ -211,9 +208,8 @@ def compare(
         several, are a design. A design of fewer than `MIN_SETS` sets is left out.
     estimators: Model files by label; all must estimate the same soil parameters.
     progress: Called with a description, the number of estimates done, and their total.
-    analytic_sets: Number of sets of each design for the analytic methods; by default at most
-        `ANALYTIC_SETS`, and as many as they can do in about `ANALYTIC_SECONDS`.
-    most_sets: Most sets of a design.
+    most_sets: Most sets of a design. Analytic methods get `ANALYTIC_SETS` at most, and as many as
+        they can do in about `ANALYTIC_SECONDS`.
 
     Returns: The results by design, then by method.
 
@@ -242,32 +238,26 @@ def compare(
     slow = [analytic_method(case, name, names) for name in order]
     results: list[MethodResult] = []
 
-    def score(method: Method, design: tuple[int, bool], count: int | None = None) -> None:
-        own = designs[design][:count]
+    def score(method: Method, design: tuple[int, bool], most: int, seconds: float) -> None:
+        own = designs[design][:most]
         report = partial(progress, f"{method.label}, {design[0]} rows")
-        estimates, seconds = method.estimate_sets(own, len(names), report)
-        truth = np.asarray([[s[column(n)][0] for n in names] for s in own])
-        results.append(MethodResult(*design, method, priors, truth, estimates, seconds))
+        estimates, each = method.estimate_sets(own, len(names), report, seconds)
+        truth = np.asarray([[s[column(n)][0] for n in names] for s in own[: len(estimates)]])
+        results.append(MethodResult(*design, method, priors, truth, estimates, each))
 
     for design in designs:
         for method in fast:
-            score(method, design)
+            score(method, design, most_sets, np.inf)
     jobs = [
         (method, design)
         for method in slow
         for design, own in designs.items()
         if all(column(c) in own[0] for c in method.channels)
     ]
-    started = time.monotonic()
+    ends_at = time.monotonic() + ANALYTIC_SECONDS
     for number, (method, design) in enumerate(jobs):
-        count = analytic_sets
-        if count is None:
-            left = ANALYTIC_SECONDS - (time.monotonic() - started)
-            pilot, share = designs[design][:PILOT], left / (len(jobs) - number)
-            each = method.estimate_sets(pilot, len(names), lambda done, total: None)[1]
-            affordable = share * usable_cores() / max(each, 1e-6) - PILOT
-            count = int(np.clip(affordable, LEAST, ANALYTIC_SETS))
-        score(method, design, count)
+        share = (ends_at - time.monotonic()) / (len(jobs) - number)
+        score(method, design, ANALYTIC_SETS, share)
     limits = {(r.rows, r.one_load): r.error for r in results if r.method.label == LIMIT}
     labels = [method.label for method in (*fast, *slow)]
     results.sort(key=lambda r: (r.rows, not r.one_load, labels.index(r.method.label)))

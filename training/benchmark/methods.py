@@ -16,18 +16,19 @@ from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.onboard.estimator import Estimator
 from soilml.processes import FORKS, process_map
-from soilml.quantities import CHANNELS, Z_50, column
+from soilml.quantities import CHANNELS, column
 
 #: Label of the method that is the Bayes limit where the model that simulated the sets is given.
 LIMIT = "analytic posterior"
+LEAST = 8  # Fewest sets of a design that a slow method is scored on
 
 
 @dataclass(frozen=True)
 class Method:
     """A method: label, description of its inputs, and the channels that it reads.
 
-    `estimate` maps the rows of one soil to (5, q): mean, ends of the 50 % interval, ends of the
-    90 % interval; NaN where a parameter is not estimated. It raises `FitError` where it fails.
+    `estimate` maps the rows of one soil to (3, q): mean, ends of the 90 % interval; NaN where a
+    parameter is not estimated. It raises `FitError` where it fails.
     """
 
     label: str
@@ -37,20 +38,27 @@ class Method:
     analytic: bool = False
 
     def estimate_sets(
-        self, sets: Sequence[Table], q: int, progress: Callable[[int, int], None]
+        self,
+        sets: Sequence[Table],
+        q: int,
+        progress: Callable[[int, int], None],
+        seconds: float = np.inf,
     ) -> tuple[Floats, float]:
-        """Estimates (n, 5, q) of every set, NaN where it fails, and the mean seconds of one.
+        """Estimates (n, 3, q) of the sets, NaN where it fails, and the mean seconds of one.
 
-        Each is one call, as on board. Analytic methods, which are slow, run on all cores.
+        Each is one call, as on board. Analytic methods, which are slow, run on all cores. After so
+        many seconds further sets are left out, except of the first `LEAST`.
         """
-        found, seconds = [], 0.0
+        found, spent, started = [], 0.0, time.monotonic()
         workers = None if self.analytic and FORKS else 1
         with process_map(self._timed, sets, workers) as results:
-            for done, (estimate, duration) in enumerate(results, 1):
-                found.append(np.full((5, q), np.nan) if estimate is None else estimate)
-                seconds += duration / len(sets)
-                progress(done, len(sets))
-        return np.stack(found), seconds
+            for estimate, duration in results:
+                found.append(np.full((3, q), np.nan) if estimate is None else estimate)
+                spent += duration
+                progress(len(found), len(sets))
+                if len(found) >= LEAST and time.monotonic() - started > seconds:
+                    break
+        return np.stack(found), spent / len(found)
 
     def _timed(self, rows: Table) -> tuple[Floats | None, float]:
         started = time.perf_counter()
@@ -61,13 +69,9 @@ class Method:
         return estimate, time.perf_counter() - started
 
 
-def _with_intervals(mean: Floats, std: Floats, interval90: Sequence[Floats]) -> Floats:
-    return np.stack([mean, mean - Z_50 * std, mean + Z_50 * std, *interval90])
-
-
 def prior_method(priors: Sequence[Prior]) -> Method:
     """The prior alone, whatever is measured."""
-    ends = np.stack([p.at(np.asarray([0.5, 0.25, 0.75, 0.05, 0.95])) for p in priors], axis=1)
+    ends = np.stack([p.at(np.asarray([0.5, 0.05, 0.95])) for p in priors], axis=1)
     return Method("prior", "-", (), lambda rows: ends)
 
 
@@ -81,7 +85,7 @@ def model_file_method(label: str, estimator: Estimator) -> Method:
             found = estimator(**{n: v[0] for n, v in readings.items()})
         else:
             found = estimator.run(**readings)
-        return _with_intervals(found.mean, found.std, [found.low, found.high])
+        return np.stack([found.mean, found.low, found.high])
 
     channels = tuple(n for n in estimator.inputs if n not in ("slip", "load"))
     return Method(label, ", ".join(estimator.inputs), channels, estimate)
@@ -95,9 +99,9 @@ def analytic_method(case: Case, name: str, names: Sequence[str]) -> Method:
     def estimate(rows: Table) -> Floats:
         seen = replace(rows, columns={k: v for k, v in rows.columns.items() if k not in hidden})
         fit = identify(case, seen, list(names), name)
-        found = _with_intervals(fit.values, np.sqrt(np.diag(fit.covariance)), fit.interval)
+        found = np.stack([fit.values, *fit.interval])
         found = np.where(np.isnan(found[0]), np.nan, found)
-        missing = np.full(5, np.nan)
+        missing = np.full(3, np.nan)
         columns = [found[:, fit.names.index(n)] if n in fit.names else missing for n in names]
         return np.stack(columns, axis=1)
 

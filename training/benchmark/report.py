@@ -53,8 +53,7 @@ def csv_columns(results: Sequence[MethodResult], names: Sequence[str]) -> dict[s
             "rmse_share_of_prior": float(r.rmse_over_prior[k]),
             "rmse_over_limit": float(r.over_limit[0][k]),
             "rmse_over_limit_std": float(r.over_limit[1][k]),
-            "cover50": float(r.coverage(50)[k]),
-            "cover90": float(r.coverage(90)[k]),
+            "cover90": float(r.coverage[k]),
             "seconds_per_estimate": r.seconds,
         }
         for r in results
@@ -73,7 +72,7 @@ def _table(own: Sequence[MethodResult], names: Sequence[str]) -> ReportTable:
             Column(quantity.symbol, [r.rmse[k] for r in own], quantity.unit, digits=3),
             Column("/prior", [r.rmse_over_prior[k] for r in own], digits=3),
             Column("/limit", ratio, std=np.nan_to_num(error).tolist(), digits=4),
-            Column("in 90 %", [r.coverage(90)[k] for r in own], "share", digits=2),
+            Column("in 90 %", [r.coverage[k] for r in own], "share", digits=2),
         ]
     columns.append(Column("failed", [f"{r.failed}/{len(r.truth)}" for r in own]))
     columns.append(Column("ms", [1e3 * r.seconds for r in own], digits=2))
@@ -99,11 +98,11 @@ def plot_comparison(results: Sequence[MethodResult], names: Sequence[str], ax: A
             style: dict[str, Any] = {"color": f"C{i}", "ms": 5, "label": short_label(method)}
             marker = "s" if own[0].method.analytic else "o"
             error.plot(x, [r.rmse_over_prior[k] for r in own], marker, **style)
-            coverage.plot(x, [r.coverage(90)[k] for r in own], marker, **style)
+            coverage.plot(x, [r.coverage[k] for r in own], marker, **style)
         error.set_title(name.replace("_", " "))
         error.set_ylim(bottom=0)
         coverage.axhspan(*NOMINAL, color="C2", alpha=0.2, lw=0)
-        lowest = [c for r in results if np.isfinite(c := r.coverage(90)[k])]
+        lowest = [c for r in results if np.isfinite(c := r.coverage[k])]
         coverage.set_ylim(min([0.5, *lowest]) - 0.02, 1.02)
         ticks = [f"{r.rows}{'' if r.one_load else '*'}" for r in _first_of_each(results)]
         for panel in (error, coverage):

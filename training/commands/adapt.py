@@ -7,7 +7,6 @@ from pathlib import Path
 
 from soilml.cli.option_values import whole_number_from
 from soilml.cli.options import REQUIRED, InputFile, folder_outputs
-from soilml.errors import InputError
 
 DESCRIPTION = """\
 Compare MODEL.toml with measured runs, add the effect that it lacks, train a
@@ -31,8 +30,6 @@ kept_back.csv, and the files of `soilml gap` in FOLDER/gap.
 The exit status is 0 also where the analysis supports no change, which is a
 result, and 2 for bad input. --suspected adds the first suspect where the
 evidence names no effect and `gap` predicts rows kept back better with it.
---truth TRUE.toml, with [soil], compares the estimates with a soil that is
-known; columns such as cohesion_Pa do the same for each run.
 """
 #: Files of the folder, beside those of the folder `gap` in it.
 FILES = (
@@ -46,7 +43,6 @@ ARGUMENTS = (
     ("--out FOLDER", "folder for all files", REQUIRED),
     ("--suspected", "add the first suspect where the evidence names none, and it predicts better"),
     ("--against FILE.onnx", "file to compare with, in place of one trained anew", InputFile),
-    ("--truth TRUE.toml", "file with the known soil in [soil]", InputFile),
     ("--rows N (40000)", "of each file's training", whole_number_from(LEAST_ROWS, MOST_ROWS)),
     "seed",
     "workers",
@@ -73,7 +69,6 @@ def run(args: argparse.Namespace) -> int:
     from training.adaptation import adapt
 
     case = read_case(args.model, with_bias=True)
-    truth = None if args.truth is None else _known_soil(args.truth)
     table = read_long_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
     print_table_hints(table, case)
     with stage_progress() as progress:
@@ -83,7 +78,6 @@ def run(args: argparse.Namespace) -> int:
             args.out,
             suspected=args.suspected,
             against=args.against,
-            truth=truth,
             rows=args.rows,
             seed=args.seed,
             workers=args.workers,
@@ -95,16 +89,3 @@ def run(args: argparse.Namespace) -> int:
     folder = Path(args.out)
     tell(f"\n{', '.join(str(folder / name) for name in ('report.html', *report.files))}")
     return 0
-
-
-def _known_soil(path: str) -> dict[str, float]:
-    """The soil of a file with [soil]; raises `InputError` where it has none."""
-    from soilml.config.model_settings import take_soil
-    from soilml.io.toml_settings import read_settings
-    from soilml.parameters import declared
-
-    settings = read_settings(path)
-    if "soil" not in settings:
-        raise InputError(f"{path}: [soil] is missing; needed is the known soil")
-    soil, _, _ = take_soil(settings.table("soil"))
-    return {name: float(getattr(soil, name)) for name in declared(type(soil))}

@@ -44,7 +44,6 @@ ARGUMENTS = (
     ("files FILE", "MODEL.onnx ..., or MODEL.toml TEST.parquet MODEL.onnx ...", InputFile, ANY),
     ("--out FOLDER", f"output folder (default for the benchmark: {FOLDER})"),
     ("--sets N", "use only the first N sets of each size", whole_number_from(1)),
-    ("--analytic-sets N", "sets of each size for the analytic methods", whole_number_from(1)),
     "workers",
 )
 
@@ -101,9 +100,7 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or FOLDER
     with create_folder(out) as folder, stage_progress() as progress, limited_workers(args.workers):
         sets = sets_of_table(table, names) if own_data else sets_of_recipe(recipe)
-        results = compare(
-            case, sets, estimators, progress, args.analytic_sets, args.sets or MAX_SETS
-        )
+        results = compare(case, sets, estimators, progress, args.sets or MAX_SETS)
         progress("drawing the report", 0, 1)
         content = {"columns": csv_columns(results, names)}
         page = comparison_report(results, names, test)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
@@ -14,16 +14,19 @@ from soilml import __version__
 from soilml.onboard.metadata import read_fields
 from soilml.onboard.set_contract import (
     MODEL_ERROR_COLUMNS,
-    MODEL_ERROR_INPUT,
-    SET_PREFIX,
     SET_SWITCH,
 )
 from soilml.onboard.tracking.soil_tracker import DEFAULT_LENGTH
-from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90
-from training.export_c.c_text import array, number, wrapped
-from training.export_c.interface import Interface, input_shapes, read_interface
+from soilml.quantities import Z_90
+from training.export_c.c_text import array, number
+from training.export_c.interface import input_shapes, read_interface
 from training.export_c.program import ARRAYS, Function, SharedParts
-from training.export_c.set_functions import set_functions, shared_floats, work_fields
+from training.export_c.set_functions import (
+    SCALARS,
+    estimate_place,
+    set_functions,
+    shared_floats,
+)
 from training.export_c.single_precision import in_single_precision
 from training.export_c.tensor import Tensor
 from training.export_c.tracker import tracker_values
@@ -33,19 +36,10 @@ from training.export_c.translation import flat_nodes, translate, with_templates
 BYTES = {"double": 8, "float": 4, "int": 4, "bool": 1}
 #: Rows that one call takes, unless the user wants another number.
 ROWS_PER_CALL = 32
-CRC_BYTES = 4096  # Of the tables of a checksum, which files for a microcontroller do without
 TEMPLATES = Path(__file__).parent / "templates"
 KERNELS = TEMPLATES / "kernels"
-#: Functions of the C library in the kernels, by element type.
-_MATH = {
-    "EXP": {"float": "expf", "double": "exp"},
-    "LEAST_POWER": {"float": "-87.0f", "double": "-708.0"},
-}
 #: Entries of the metadata that tell one file from another, and what they were trained from.
 IDENTITY = ("graph_sha256", "metadata_sha256", "data_sha256", "recipe_sha256", "spec_sha256")
-#: Outputs that are one number for a row or set; others have one for each estimated quantity, or for
-#: each pair of them.
-SCALARS = ("in_range", "misfit")
 SINGLE_OUTPUTS = ("mean", "std", "covariance", "in_range")  # Of a file that estimates from rows
 
 
@@ -97,73 +91,81 @@ def write_c(
     """
     model = with_templates(in_single_precision(model, metadata)[0])
     interface, shared = read_interface(model, metadata), SharedParts()
-    single = single_function(model, shared) if interface.single else None
-    sets = set_functions(model, interface, shared, rows) if interface.sets else None
-    functions = [single] if single else []
-    functions += [sets.row, sets.set, sets.once, sets.soil, sets.answer] if sets else []
-    arrays = {
-        name: (kind, max(f.lengths.get(kind, 0) for f in functions))
-        for kind, name in ARRAYS.items()
-        if any(kind in f.lengths for f in functions)
-    }
-    members: dict[str, int] = {}
-    constants = shared.used_in("\n".join(function.text for function in functions))
+    fields = read_fields(metadata)
+    noise = fields["sets"].noise if fields["sets"] else {}
+    single = single_function(model, shared, name) if interface.single else None
+    sets = set_functions(model, interface, shared, rows, name) if interface.sets else None
+    functions = [*([single] if single else []), *(sets.all if sets else [])]
+    memory = members = of_sampler = 0
     if sets:
         shared.kernel("tanh_of", "float")
-        arrays["floats"] = "float", max(arrays["floats"][1], shared_floats(sets))
-        members = work_fields(sets, interface.columns, rows)
-    work = sum(BYTES[kind] * length for kind, length in arrays.values())
-    work += 4 * sum(members.values())
-    of_sampler = sum(np.size(x) for x in sets.values["arrays"].values()) if sets else 0
-    if interface.sets:
-        work += len(interface.rows) * rows * 4 + interface.columns * BYTES[interface.precision] + 40
-    triangle = interface.columns * (interface.columns + 1) // 2
-    memory = triangle * BYTES[interface.precision] + (4 + len(interface.context)) * 4 + 24
+        columns, real = interface.columns, BYTES[interface.precision]
+        of_sampler = 4 * sum(np.size(x) for x in sets.values["arrays"].values())
+        members = 4 * sum(prod(sizes) for sizes in sets.members.values())
+        members += (4 * len(interface.rows) + 4) * rows + columns * real + 40
+        members += sum(BYTES[kind] * prod(shape) for kind, shape in sets.answer.outputs.values())
+        memory = columns * (columns + 1) // 2 * real + (4 + len(interface.context)) * 4 + 24
+        memory = -(-memory // 8) * 8
+    common = common_values(functions, shared, shared_floats(sets.values) if sets else 0)
     sizes = {
-        "memory_bytes": -(-memory // 8) * 8 if interface.sets else 0,
-        "work_bytes": -(-work // 8) * 8,
-        "constant_bytes": sum(v.size * BYTES[kind] for _, v, kind in constants)
-        + 4 * of_sampler
-        + (CRC_BYTES if interface.sets and not interface.small else 0),
+        "memory_bytes": memory,
+        "work_bytes": -(-(common["array_bytes"] + members) // 8) * 8,
+        "constant_bytes": common["constant_bytes"] + of_sampler,
     }
     environment = template_environment()
-    environment.filters["scalar"] = lambda output: output.removeprefix(SET_PREFIX) in SCALARS
-    fields = read_fields(metadata)
     values = {
         "name": name,
         "NAME": name.upper(),
         "origin": origin,
         "version": __version__,
         "model_version": metadata["soilml_version"],
+        "command": "export c",
+        "subject": "estimates of the soil under a running gear",
         "identity": {key: metadata[key] for key in IDENTITY if key in metadata},
-        "noise": fields["sets"].noise if fields["sets"] else {},
-        "sha": metadata["graph_sha256"],
+        "noise": noise,
         "codes": CODES,
         "interface": interface,
-        "functions": functions,
         "single": single,
         "sets": sets,
         "sampler": sets.values if sets else {},
-        "arrays": arrays,
-        "members": members,
-        "constants": [array(*parts) for parts in constants],
-        "kernels": kernel_texts(shared),
         "rows": rows,
         "quantities": list(zip(fields["names"], fields["units"], strict=True)),
         "lower": fields["prior"].lower.tolist(),
         "upper": fields["prior"].upper.tolist(),
         "factors": fields["coverage_factor"].tolist(),
         "z90": Z_90,
-        "vague": NOT_IDENTIFIED_ABOVE,
-        "exact_columns": _exact_columns(interface),
+        "scalars": SCALARS,
+        "exact_columns": interface.columns - len(MODEL_ERROR_COLUMNS),
         "least_share": fields["sets"].least_share_in_range if fields["sets"] else 0.0,
-        "tracker": tracker_values(interface, sizes["memory_bytes"], length) if sets else None,
+        "tracker": tracker_values(interface, noise, memory, length) if sets else None,
+        **common,
         **sizes,
     }
     source, header = (
         environment.get_template(f"{part}.j2").render(values) for part in ("source.c", "header.h")
     )
     return CFile(source, header, **sizes)
+
+
+def common_values(
+    functions: Sequence[Function], shared: SharedParts, least_floats: int = 0
+) -> dict[str, Any]:
+    """Values for the templates of any C file, and the bytes of working arrays and constants.
+
+    least_floats: Numbers of float that functions of the templates take of the working arrays.
+    """
+    lengths = {"float": least_floats} if least_floats else {}
+    for function in functions:
+        lengths |= {k: max(n, lengths.get(k, 0)) for k, n in function.lengths.items()}
+    constants = shared.used_in("\n".join(function.text for function in functions))
+    return {
+        "functions": functions,
+        "arrays": {ARRAYS[kind]: (kind, lengths[kind]) for kind in ARRAYS if kind in lengths},
+        "constants": [array(*parts) for parts in constants],
+        "kernels": kernel_texts(shared),
+        "array_bytes": sum(BYTES[kind] * length for kind, length in lengths.items()),
+        "constant_bytes": sum(v.size * BYTES[kind] for _, v, kind in constants),
+    }
 
 
 def template_environment() -> Any:
@@ -178,39 +180,30 @@ def template_environment() -> Any:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    environment.globals["crc_tables"] = [[f"{x:#x}u" for x in own] for own in _crc_tables()]
     environment.filters["float"] = lambda x: number(x, "float")
     environment.filters["elements"] = prod
-    environment.filters["wrapped"] = lambda text, indent: "\n".join(wrapped(text, indent))
     environment.filters["constant_array"] = _constant_array
     environment.filters["floats"] = lambda many: ", ".join(number(x, "float") for x in many)
     return environment
 
 
-def _crc_tables() -> list[list[int]]:
-    """Four tables (256,) of CRC-32: of a byte, and of one with up to three zeros behind it."""
-    first = []
-    for crc in range(256):
-        for _ in range(8):
-            crc = crc >> 1 ^ (0xEDB88320 if crc & 1 else 0)
-        first.append(crc)
-    tables = [first]
-    while len(tables) < CRC_BYTES // 1024:
-        tables.append([x >> 8 ^ first[x & 255] for x in tables[-1]])
-    return tables
-
-
-def single_function(model: Any, shared: SharedParts) -> Function:
-    """The estimate from one row."""
+def single_function(model: Any, shared: SharedParts, name: str) -> Function:
+    """The estimate from one row, for a prefix of C names."""
     known = {SET_SWITCH: Tensor.constant(np.zeros(1, np.bool_))}
     nodes = flat_nodes(model.graph, known)
     inputs = {
-        name: Tensor(f"in_{name}", kind, (1,))
-        for name, (kind, dims) in input_shapes(model).items()
-        if len(dims) == 1 and name != SET_SWITCH
+        key: Tensor(f"(&row->{key})", kind, (1,))
+        for key, (kind, dims) in input_shapes(model).items()
+        if len(dims) == 1 and key != SET_SWITCH
     }
     outputs = [o.name for o in model.graph.output if o.name in SINGLE_OUTPUTS]
-    return translate("single_graph", nodes, known, inputs, outputs, shared)
+    places = {output: estimate_place(output) for output in outputs}
+    parameters = {
+        "row": f"const {name}_row *row",
+        "estimate": f"{name}_estimate *estimate",
+        "work": "WORK *work",
+    }
+    return translate("single_graph", nodes, known, inputs, places, shared, parameters, True)
 
 
 def _constant_array(values: Any, name: str) -> str:
@@ -219,18 +212,7 @@ def _constant_array(values: Any, name: str) -> str:
     return array(name, np.asarray(values), "int" if whole else "float")
 
 
-def _exact_columns(interface: Interface) -> int:
-    """Columns of a memory without errors of the model; 0 for a file whose model has none."""
-    known = any(field.name == MODEL_ERROR_INPUT for field in interface.context)
-    return interface.columns - len(MODEL_ERROR_COLUMNS) if interface.sets and known else 0
-
-
 def kernel_texts(shared: SharedParts) -> list[str]:
     """Texts of the kernels of a file, each for one element type."""
-    found = []
-    for name, kind in sorted(shared.kernels):
-        text = (KERNELS / f"{name}.c").read_text()
-        for mark, functions in _MATH.items():
-            text = text.replace(mark, functions.get(kind, mark))
-        found.append(text.replace("REAL", kind))
-    return found
+    texts = {name: (KERNELS / f"{name}.c").read_text() for name, _ in shared.kernels}
+    return [texts[name].replace("REAL", kind) for name, kind in sorted(shared.kernels)]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from soilml.errors import ModelFileError
 from training.export_c.c_text import element_loops, leaves_of, wrapped
-from training.export_c.tensor import DTYPES, Shape, Tensor
+from training.export_c.tensor import DTYPES, REAL, Shape, Tensor
 
 LONGEST_EXPRESSION = 6  # Tensors that one expression reads at most; longer ones are hard to read
 #: Members of the working memory by element type.
@@ -132,20 +132,27 @@ class Program:
 
 @dataclass(frozen=True)
 class Function:
-    """A function of C that computes a graph: its text, and what it takes and gives."""
+    """A function of C that computes a graph: its text, and how it is called."""
 
-    name: str
     text: str
-    inputs: tuple[str, ...]  # inputs of the graph that it reads, after the working memory
-    outputs: dict[str, tuple[str, Shape]]  # C type and shape of each, to which it sets a pointer
+    call: str  # with variables that have the names of its parameters
+    outputs: dict[str, tuple[str, Shape]]  # C type and shape of each
     lengths: dict[str, int]  # elements of working memory by type
 
     @staticmethod
     def of(
-        name: str, program: Program, inputs: Mapping[str, Tensor], outputs: Mapping[str, Tensor]
+        name: str,
+        program: Program,
+        outputs: Mapping[str, tuple[Tensor, str]],
+        parameters: Mapping[str, str],
+        checked: bool = False,
     ) -> Function:
-        """From statements, and the tensors of inputs and outputs."""
-        made = {key: program.stored(tensor) for key, tensor in outputs.items()}
+        """From statements, and where each output is to lie (a C pointer).
+
+        parameters: Declarations by name, of which those that the text reads are declared.
+        checked: Whether nothing is written unless all numbers are finite, which it then returns.
+        """
+        made = {key: program.stored(tensor) for key, (tensor, _) in outputs.items()}
         kept = [tensor.home for tensor in made.values() if tensor.home in program.memory]
         offsets, lengths = program.places(kept)
         body: list[str] = []
@@ -162,20 +169,24 @@ class Function:
             declare(names)
             body.append(code)
         declare(kept)
-        body += [f"    *out_{key} = {tensor.name};" for key, tensor in made.items()]
+        if checked:
+            numbers = [tensor for tensor in made.values() if tensor.kind in REAL]
+            every = [f"all_finite_{t.kind}({t.name}, {t.count})" for t in numbers]
+            body += [*wrapped(f"if (!({' && '.join(every)}))", 4), "        return false;"]
+            for tensor in numbers:
+                program.shared.kernel("all_finite", tensor.kind)
+        for key, (_, place) in outputs.items():
+            tensor = made[key]
+            size = f"{max(tensor.count, 1)} * sizeof({tensor.kind})"
+            body += wrapped(f"memmove({place}, {tensor.name}, {size});", 4)
+        body += ["    return true;"] if checked else []
         text = "\n".join(body)
-        names = {*re.findall(r"\bin_\w+", text)}
-        read = [n for n, t in inputs.items() if t.value is None and t.name in names]
-        parameters = [
-            "WORK *work",
-            *(f"const {inputs[n].kind} *{inputs[n].name}" for n in read),
-            *(f"const {tensor.kind} **out_{key}" for key, tensor in made.items()),
-        ]
-        head = wrapped(f"static void {name}({', '.join(parameters)})", 0)
-        unused = [] if "work->" in text else ["    (void)work;"]
+        read = [own for own in parameters if re.search(rf"\b{own}\b", text)]
+        declared = ", ".join(parameters[own] for own in read)
+        head = wrapped(f"static {'bool' if checked else 'void'} {name}({declared})", 0)
         shapes = {key: (tensor.kind, tensor.shape) for key, tensor in made.items()}
-        whole = "\n".join([*head, "{", *unused, text, "}"])
-        return Function(name, whole, tuple(read), shapes, lengths)
+        whole = "\n".join([*head, "{", text, "}"])
+        return Function(whole, f"{name}({', '.join(read)})", shapes, lengths)
 
 
 @dataclass(frozen=True)

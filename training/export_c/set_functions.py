@@ -2,13 +2,16 @@
 
 The composites `FirstRound`, `LikeliestSoil` and `Posterior` take all rows of a set; C has templates
 for them. What is between them is translated: for one row, before and after the soil is known at
-which errors are linear, and for the whole set, before and after the sample of the posterior.
+which errors are linear, and for the whole set, before and after the sample of the posterior. Each
+function reads and writes members of the C structs where they lie.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -16,9 +19,9 @@ from numpy.typing import NDArray
 
 from soilml.errors import ModelFileError
 from soilml.onboard.set_contract import (
-    MEMORY_INPUTS,
     MEMORY_OUTPUTS,
     MODEL_ERROR_COLUMNS,
+    MODEL_ERROR_INPUT,
     ROW_IN_RANGE,
     SENSOR_ERROR_COLUMNS,
     SET_PREFIX,
@@ -47,6 +50,9 @@ EARLIER = (
 TILE, SMALL_TILE = 32, 8
 FEW_ROWS = 20  # A system of so many rows is not made smaller
 GRAIN = 8  # Numbers of a row of the system are a multiple of this, for vector instructions
+#: Outputs that are one number for a row or set; others have one for each estimated quantity, or for
+#: each pair of them.
+SCALARS = ("in_range", "misfit")
 
 
 @dataclass(frozen=True)
@@ -58,20 +64,20 @@ class SetFunctions:
     once: Function  # values of a soil that are the same for all rows
     soil: Function  # columns of a row at a soil
     answer: Function  # outputs of a set
-    #: what `soil` needs of a row: number of floats, and where each value begins among them
-    kept: int
-    places: dict[str, int]
-    #: the same of `once`
-    of_soil: int
-    soil_places: dict[str, int]
-    #: C names of the outputs of `row` and `set` by what they are
-    names: dict[str, str]
-    given: dict[str, str]  # C expressions of values that composites make
+    row_columns: int  # that `row` gives; the others are of errors of the model
+    members: dict[str, tuple[int, ...]]  # of the working memory, of float, with their sizes
     values: dict[str, Any]  # for the template
 
+    @property
+    def all(self) -> list[Function]:
+        """All functions, in the order in which they are called."""
+        return [self.row, self.set, self.once, self.soil, self.answer]
 
-def set_functions(model: Any, interface: Interface, shared: SharedParts, rows: int) -> SetFunctions:
-    """Of a model with a set posterior, for steps of so many rows.
+
+def set_functions(
+    model: Any, interface: Interface, shared: SharedParts, rows: int, name: str
+) -> SetFunctions:
+    """Of a model with a set posterior, for steps of so many rows and a prefix of C names.
 
     Raises `ModelFileError` for a graph without the composites: one of an earlier version.
     """
@@ -83,92 +89,90 @@ def set_functions(model: Any, interface: Interface, shared: SharedParts, rows: i
         raise ModelFileError(EARLIER)
     likeliest = next((node for node in nodes if node.op_type == LIKELIEST), None)
     first, posterior = (_arguments(model, found[kind]) for kind in (FIRST, POSTERIOR))
-    given = {
-        name: Tensor(f"in_{name}", kind, (1,))
-        for name, (kind, dims) in shapes.items()
-        if name not in (SET_SWITCH, *MEMORY_INPUTS) and len(dims) == 1
+    of_rows = {
+        field.name: Tensor(f"(&work->readings[{k}][r])", shapes[field.name][0], (1,))
+        for k, field in enumerate(interface.rows)
     }
-    for name in given:
-        known.pop(name, None)
-    of_rows = {name for name in given if isinstance(shapes[name][1][0], str)}
-    of_set = {name: tensor for name, tensor in given.items() if name not in of_rows}
+    of_set = {
+        field.name: Tensor(f"(&memory->context.{field.name})", shapes[field.name][0], (1,))
+        for field in interface.context
+    }
+    if MODEL_ERROR_INPUT in of_set:  # which a check leaves out
+        of_set[MODEL_ERROR_INPUT] = Tensor("work->size", "float", (1,))
+    for given in (*of_rows, *of_set):
+        known.pop(given, None)
     counted = next(n.output[0] for n in nodes if MEMORY_OUTPUTS[1] in n.output[0])
     basis = (likeliest or found[FIRST]).output[0]
     terms = interface.columns - len(SENSOR_ERROR_COLUMNS) - len(MODEL_ERROR_COLUMNS)
-    soil = Tensor("in_soil", "float", (terms, 1))
+    soil = Tensor("work->soil", "float", (terms, 1))
+    made = partial(
+        translate, nodes=nodes, known=known, shared=shared,
+        parameters={
+            "memory": f"const {name}_memory *memory", "r": "int r",
+            "estimate": f"{name}_set_estimate *estimate", "work": "WORK *work",
+        },
+    )  # fmt: skip
     # values that follow from the readings of a row, and from the soil as well
     composites = [node for node in nodes if node.op_type in (SOUND, FIRST, LIKELIEST, POSTERIOR)]
     others = [node for node in nodes if node not in composites and counted not in node.output]
-    row_values = _following(others, of_rows)
-    soil_values = _following(others, {basis})
-    live = {
-        name
-        for node in others
-        if soil_values & set(node.output)
-        for name in node.input
-        if name in row_values and name not in soil_values
-    }
-    own = {found[SOUND].output[1]: Tensor.constant(np.zeros(3, np.float32))}
-    names = {
-        "columns": first["columns"], "used": first["used"], "in_range": ROW_IN_RANGE,
-        "counted": counted,
-    }  # fmt: skip
-    row = translate(
-        "row_graph", nodes, known, {**given, **own},
-        [*names.values(), *sorted(live)], shared,
+    row_values, soil_values = _following(others, of_rows), _following(others, {basis})
+    of_soil = [node for node in others if soil_values & {*node.output}]
+    live = {n for node in of_soil for n in node.input if n in row_values - soil_values}
+    of_both = [node for node in of_soil if row_values & {*node.output}]
+    common = {n for node in of_both for n in node.input if n in soil_values - row_values - {basis}}
+    kept = {value: f"of_rows_{k}" for k, value in enumerate(sorted(live))}
+    of_all = {value: f"of_soil_{k}" for k, value in enumerate(sorted(common))}
+    no_counts = {found[SOUND].output[1]: Tensor.constant(np.zeros(3, np.float32))}
+    row = made(
+        "row_graph", inputs={**of_rows, **of_set, **no_counts},
+        outputs={
+            first["columns"]: "work->of_row", first["used"]: "work->used[r]",
+            ROW_IN_RANGE: "(work->inside + r)", counted: "work->of_counts",
+            **{value: f"work->{member}[r]" for value, member in kept.items()},
+        },
     )  # fmt: skip
-    if row.outputs[first["columns"]][1][0] != CHANNELS:
+    channels, row_columns = row.outputs[first["columns"]][1]
+    if channels != CHANNELS:
         raise ModelFileError(EARLIER)
-    kept = {name: Tensor(f"in_{name}", *row.outputs[name]) for name in sorted(live)}
-    shared_values = {
-        name
-        for node in others
-        if soil_values & row_values & set(node.output)
-        for name in node.input
-        if name in soil_values and name not in row_values and name != basis
-    }
-    once = translate(
-        "once_graph", nodes, known, {basis: soil, **of_set}, sorted(shared_values), shared
-    )
-    for_rows = {name: Tensor(f"in_{name}", *once.outputs[name]) for name in sorted(shared_values)}
-    starts, begins = (
-        np.cumsum([0, *(tensor.count for tensor in own.values())]) for own in (kept, for_rows)
-    )
-    if wrong := [n for n, tensor in (kept | for_rows).items() if tensor.kind != "float"]:
+    if wrong := [value for value in kept if row.outputs[value][0] != "float"]:
         raise ModelFileError(f"value {wrong[0]} of a row is not float32")
-    inputs = {basis: soil, **kept, **for_rows, **of_set}
-    at_soil = translate("soil_graph", nodes, known, inputs, [posterior["columns"]], shared)
-    total = {counted: Tensor("in_counted", "float", (3,))}
-    of_composites = {"limit": posterior["limit"], "size": posterior["size"]}
-    if "unknowns" in first:
-        of_composites["unknowns"] = first["unknowns"]
+    places = {value: f"work->{member}" for value, member in of_all.items()}
+    once = made("once_graph", inputs={basis: soil, **of_set}, outputs=places)
+    rows_kept = {v: Tensor(f"work->{m}[r]", *row.outputs[v]) for v, m in kept.items()}
+    soil_kept = {v: Tensor(places[v], *once.outputs[v]) for v in of_all}
+    at_soil = made(
+        "soil_graph", inputs={basis: soil, **rows_kept, **soil_kept, **of_set},
+        outputs={posterior["columns"]: "work->of_row"},
+    )  # fmt: skip
+    total = {counted: Tensor("work->counted", "float", (3,))}
+    of_composites = {posterior["limit"]: "work->limit", posterior["size"]: "work->size"}
     if likeliest is not None:
-        of_composites["std"] = _arguments(model, likeliest)["std"]
-    whole = translate(
-        "set_graph", nodes, known, {**of_set, **total}, of_composites.values(), shared
-    )
+        of_composites[_arguments(model, likeliest)["std"]] = "work->std"
+        of_composites[first["unknowns"]] = "work->unknowns"
+    whole = made("set_graph", inputs={**of_set, **total}, outputs=of_composites)
     sizes = _values(known, first, posterior, interface, rows, nodes, likeliest, model)
     points = sizes["POINTS"]
-    sample = dict(
-        zip(
-            found[POSTERIOR].output,
-            (
-                Tensor("in_points", "float", (1 + sizes["UNKNOWNS"], points)),
-                Tensor("in_weights", "float", (1, points)),
-                Tensor("in_misfit", "float", (1,)),
-            ),
-            strict=False,
-        )
-    )
+    sampled = {"points": (1 + sizes["UNKNOWNS"], points), "weights": (1, points), "misfit": (1,)}
+    sample = {
+        value: Tensor(f"work->{member}", "float", shape)
+        for value, (member, shape) in zip(found[POSTERIOR].output, sampled.items(), strict=False)
+    }
     outputs = [o.name for o in model.graph.output if o.name.startswith(SET_PREFIX)]
-    answer = translate("answer_graph", nodes, known, {**of_set, **total, **sample}, outputs, shared)
-    of_c = {basis: "work->soil", counted: "work->counted"}
-    of_c |= {n: f"work->{t.name.removeprefix('in_')}" for n, t in sample.items()}
-    return SetFunctions(
-        row, whole, once, at_soil, answer, int(starts[-1]),
-        dict(zip(kept, starts.tolist(), strict=False)), int(begins[-1]),
-        dict(zip(for_rows, begins.tolist(), strict=False)), names | of_composites, of_c, sizes,
+    answer = made(
+        "answer_graph", inputs={**of_set, **total, **sample}, checked=True,
+        outputs={output: estimate_place(output.removeprefix(SET_PREFIX)) for output in outputs},
     )  # fmt: skip
+    members: dict[str, tuple[int, ...]] = {
+        **{m: (rows, prod(row.outputs[v][1])) for v, m in kept.items()},
+        **{m: (prod(once.outputs[v][1]),) for v, m in of_all.items()},
+        **_work_members(sizes, interface.columns, rows),
+    }
+    return SetFunctions(row, whole, once, at_soil, answer, row_columns, members, sizes)
+
+
+def estimate_place(output: str) -> str:
+    """Where an output lies in the struct of an estimate."""
+    return f"{'&' if output in SCALARS else ''}estimate->{output}"
 
 
 def _arguments(model: Any, node: Any) -> dict[str, str]:
@@ -213,6 +217,7 @@ def _values(
     present = value(posterior, "present")
     zs: Any = value(_arguments(model, likeliest), "powers") if likeliest is not None else []
     sizes = {
+        "CHANNELS": CHANNELS,
         "MONOMIALS": interface.columns - len(SENSOR_ERROR_COLUMNS) - len(MODEL_ERROR_COLUMNS),
         "TERMS": len(order),
         "POWERS": int(powers.max()) + 1,
@@ -255,28 +260,28 @@ def _values(
     return sizes | {"arrays": arrays, "numbers": numbers}
 
 
-def work_fields(functions: SetFunctions, columns: int, rows: int) -> dict[str, int]:
-    """Numbers of float of the members of the working memory that the sampler needs, by name."""
-    v = functions.values
+def _work_members(values: Mapping[str, Any], columns: int, rows: int) -> dict[str, tuple[int, ...]]:
+    """Members of the working memory that the sampler needs, of float, with their sizes."""
+    v = values
     first, most = v["FIRST"], max(v["WIDTH"], columns, 2 * v["ERRORS"] + 7)
-    return {
-        "change": most, "squares": v["WIDTH"],
+    unknowns = v["MONOMIALS"] * (v["TERMS"] + v["LINEAR"]) if v["LINEAR"] else v["MONOMIALS"]
+    numbers = {
+        "of_row": CHANNELS * columns, "of_counts": 3, "counted": 3, "limit": 1, "size": 1,
+        "misfit": 1, "change": most, "squares": v["WIDTH"],
         "monomials": max(v["TERMS"], v["ERRORS"]) * v["TILE"],
         "points": (1 + v["UNKNOWNS"]) * v["POINTS"], "weights": v["POINTS"],
-        "soil": v["MONOMIALS"], "unknowns": v["MONOMIALS"] * (v["TERMS"] + v["LINEAR"])
-        if v["LINEAR"] else v["MONOMIALS"], "std": max(v["LINEAR"], 1),
+        "soil": v["MONOMIALS"], "unknowns": unknowns, "std": max(v["LINEAR"], 1),
         "drawn": first, "outside": first, "log_weight": first, "least": first, "first_least": first,
         "total": first, "parts": v["SCALES"] * first, "of_scale": v["SCALES"],
         "whitening": v["SCALES"] * v["ERRORS"] ** 2,
         "mean": v["ERRORS"] * max(v["WIDTH"], 2 * v["ERRORS"] + 7),
-        "unbounded": max(v["UNKNOWNS"] - 1, 1) * v["ADAPTED"],
-        "kept": rows * functions.kept, "of_soil": max(functions.of_soil, 1),
-        "fresh": CHANNELS * rows * columns,
+        "unbounded": max(v["UNKNOWNS"] - 1, 1) * v["ADAPTED"], "fresh": CHANNELS * rows * columns,
     }  # fmt: skip
+    return {member: (count,) for member, count in numbers.items()}
 
 
-def shared_floats(functions: SetFunctions) -> int:
+def shared_floats(values: Mapping[str, Any]) -> int:
     """Numbers of float of the system and of coefficients, which functions share."""
-    v = functions.values
+    v = values
     tiles = (2 * v["ERRORS"] + v["REST"]) * v["POWERS"] * v["TILE"]
     return int(v["MOST_ROWS"] * v["WIDTH"] + tiles)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -61,16 +61,19 @@ def translate(
     nodes: Sequence[Any],
     known: Mapping[str, Tensor],
     inputs: Mapping[str, Tensor],
-    outputs: Iterable[str],
+    outputs: Mapping[str, str],
     shared: SharedParts,
+    parameters: Mapping[str, str],
+    checked: bool = False,
 ) -> Function:
-    """A function that computes some outputs.
+    """A function that computes some values, and writes them to places (C pointers) by name.
 
     Nodes whose inputs are constant are computed now, and nodes that the outputs do not need are
     left out.
 
     known: Constants by name.
-    inputs: Values that the C function is given, or constants that take their place.
+    inputs: Values that the C function reads where they lie, or constants that take their place.
+    parameters, checked: See `Function.of`.
 
     Raises `ModelFileError` for an operator, or a form of it, that is not known.
     """
@@ -84,7 +87,8 @@ def translate(
         for key, tensor in zip(node.output, made, strict=False):
             several = tensor.text and uses[key] > 1
             found[key] = program.stored(tensor) if several else tensor
-    return Function.of(name, program, inputs, {key: found[key] for key in wanted})
+    placed = {key: (found[key], place) for key, place in outputs.items()}
+    return Function.of(name, program, placed, parameters, checked)
 
 
 def _translated(program: Program, node: Any, inputs: list[Tensor | None]) -> list[Tensor]:

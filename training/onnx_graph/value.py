@@ -109,10 +109,6 @@ class Value:
         """A constant of whole numbers (int64), as ONNX takes indices, axes and shapes."""
         return self._output(self.graph.constant(np.asarray(numbers, dtype=np.int64)))
 
-    def number(self, number: int) -> Value:
-        """A constant whole number (int64) without axes, as an index that leaves out an axis."""
-        return self._output(self.graph.constant(np.asarray(number, dtype=np.int64)))
-
     def astype(self, dtype: type) -> Value:
         """The value cast to another element type."""
         name = self.graph.op("Cast", self.name, to=_ELEMENT_TYPES[dtype])
@@ -176,12 +172,6 @@ class Value:
         """
         axes = [] if axis is None else [self.indices([axis])]
         return self.node(kind, *axes, **({} if keepdims is None else {"keepdims": int(keepdims)}))
-
-    def derived(self, matrix: NDArray[Any]) -> Value:
-        """`matrix @ self` for a matrix with one number in each row at most."""
-        columns = np.abs(matrix).argmax(axis=1)
-        factors = np.take_along_axis(matrix, columns[:, None], 1)
-        return self.take(columns.tolist(), axis=0) * factors
 
     def named(self, name: str) -> Value:
         """The value under the name of a graph output; only for the output of the last node."""

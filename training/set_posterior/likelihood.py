@@ -59,10 +59,15 @@ class Linear:
         return Linear(terms, sampled, parts, axes, std.take([a - 1 for a in axes], axis=0))
 
     def in_the_middle(self) -> Value:
-        """The columns (terms, sampled + z) of x and z, linear in the middle of the prior."""
-        select = np.eye(len(self.terms))[:, [self.terms.index(term) for term in self.sampled]]
-        middle = constant(self.std.graph, np.eye(len(self.terms), 1))
-        return concat([constant(middle.graph, select), *self._changes(middle)], axis=1)
+        """The columns (terms, sampled + z) of x and z, linear in the middle of the prior.
+
+        There the monomials of z change with z alone, by one standard deviation.
+        """
+        linear = [(*(ONE,) * (len(self.terms[0]) - 1), axis) for axis in self.axes]
+        places = [self.terms.index(term) for term in (*self.sampled, *linear)]
+        ones = np.ones((1, len(self.sampled)))
+        scale = concat([constant(self.std.graph, ones), self.std.reshape(1, -1)], axis=1)
+        return np.eye(len(self.terms))[:, places] * scale
 
     def at(self, soil: Value, system: dict[str, Value]) -> tuple[Value, Value]:
         """Monomials (terms, 1) of x and the likeliest z, and the columns, linear there.
@@ -117,12 +122,6 @@ class Linear:
         offset = reduce(add, (c * u for c, u in zip(changes, units, strict=True)))
         in_x = self.parts.T * of_z - offset * first
         return [whole, concat([in_x, *changes], axis=1)]
-
-    def _changes(self, whole: Value) -> list[Value]:
-        """Changes (terms, 1) of monomials (terms, 1) with one standard deviation of each z."""
-        stds = self.std.split(len(self.axes), axis=0)
-        derivatives = (derivative(self.terms, axis) for axis in self.axes)
-        return [whole.derived(d) * std for d, std in zip(derivatives, stds, strict=True)]
 
 
 def _joined(state: Value, columns: Value, used: Value, errors: list[int]) -> list[Value]:

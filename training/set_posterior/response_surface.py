@@ -159,7 +159,7 @@ class Response:
         """Weights (units, inputs) and values (units, rows) of all layers but the last.
 
         The first takes features without their mean, and scales them. Names of the constants are
-        those by which `stored_response` reads a file.
+        those by which `exported/stored_response.py` reads a file.
         """
         graph, layers = features.graph, []
         mean = constant(graph, self.scaling.mean[:, None], name=f"{name}_mean")

@@ -123,9 +123,9 @@ def _without_markers(stacked: Value, noise: FileNoise) -> dict[str, Value]:
     """Slip and load, and channels and standard deviations without markers, (1, rows)."""
     k, others = len(RESPONSE_CHANNELS), len(ROW_STDS) - len(RESPONSE_CHANNELS)
     operating, _, std = stacked.split([len(OPERATING_NOISE), k, len(ROW_STDS)], axis=0)
-    read = [ROWS.index(_reading_of(name)) for name in ROW_STDS]
+    read = [ROWS.index(reading_of(name)) for name in ROW_STDS]
     reading = stacked.take(read, axis=0)  # (stds, rows)
-    parts = np.asarray([_noise_of(name, noise) for name in ROW_STDS])
+    parts = np.asarray([noise_of(name, noise) for name in ROW_STDS])
     may_be_zero = np.asarray([[name in MAY_BE_ZERO] for name in ROW_STDS])
     least = np.where(may_be_zero, 0.0, LEAST_STD)
     own = reading * parts[:, 1:]
@@ -150,14 +150,14 @@ def _without_markers(stacked: Value, noise: FileNoise) -> dict[str, Value]:
     return rows | {"torque_bias": bias}
 
 
-def _reading_of(name: str) -> str:
+def reading_of(name: str) -> str:
     """The reading that a standard deviation is of: torque of torque_std and torque_bias."""
     return name.rpartition("_")[0]
 
 
-def _noise_of(name: str, noise: FileNoise) -> tuple[float, float]:
+def noise_of(name: str, noise: FileNoise) -> tuple[float, float]:
     """Constant part and share of the file's noise for a standard deviation."""
-    reading = _reading_of(name)
+    reading = reading_of(name)
     constant_part, share = noise.get(reading if name.endswith("_std") else name, (0.0, 0.0))
     if reading in OPTIONAL_READINGS and not constant_part + share:
         return ABSENT_STD, 0.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -12,17 +11,26 @@ import numpy as np
 from soilml import __version__
 from soilml.onboard.slip_stream import FLAGS, POSSIBLE, QUANTILES, RECENT
 from soilml.slip_filter.filter import SlipFilter
-from training.export_c.c_file import BYTES, CRC_BYTES, kernel_texts, template_environment
+from training.export_c.c_file import common_values, template_environment
 from training.export_c.c_text import array
 from training.export_c.interface import input_shapes
-from training.export_c.program import ARRAYS, SharedParts
+from training.export_c.program import SharedParts
 from training.export_c.tensor import Tensor
 from training.export_c.translation import flat_nodes, translate
 from training.slip_step.graph import start_of
 
 #: Entries of the metadata that tell one file from another, and which rover and prior it is for.
 IDENTITY = ("graph_sha256", "metadata_sha256", "case_sha256")
-OUTPUTS = ("speed", "slip", "probability", "flags", "grounds_out", "recent_out")
+#: Where inputs of the graph lie, and its outputs.
+PLACES = {
+    "grounds": "state->grounds", "recent": "state->recent", "rim_speed": "row->rim_speed",
+    "torque": "row->torque", "load": "row->load", "slope": "(&row->slope)",
+    "elapsed": "(&row->elapsed)",
+}  # fmt: skip
+OUTPUTS = {
+    "speed": "work->speed", "slip": "estimate->slips", "probability": "work->probability",
+    "flags": "work->flags", "grounds_out": "state->grounds", "recent_out": "state->recent",
+}  # fmt: skip
 
 CODES = (
     ("OK", 0, "answered"),
@@ -45,27 +53,28 @@ def write_slip_c(
     """
     shared = SharedParts()
     inputs = {
-        key: Tensor(f"in_{key}", kind, tuple(int(d) for d in dims))
+        key: Tensor(PLACES[key], kind, tuple(int(d) for d in dims))
         for key, (kind, dims) in input_shapes(model).items()
     }
     known: dict[str, Tensor] = {}
     nodes = flat_nodes(model.graph, known)
-    function = translate("step_graph", nodes, known, inputs, OUTPUTS, shared)
-    used = shared.used_in(function.text)
-    start, _ = start_of(filter_)
-    arrays = {ARRAYS[kind]: (kind, length) for kind, length in function.lengths.items()}
-    sizes = {
-        "work_bytes": sum(BYTES[kind] * length for kind, length in arrays.values()),
-        "state_bytes": 4 * (start.size + RECENT + 2),
-        "constant_bytes": sum(v.size * BYTES[kind] for _, v, kind in used)
-        + 4 * start.shape[0]
-        + CRC_BYTES,
+    parameters = {
+        "state": f"{name}_state *state",
+        "row": f"const {name}_row *row",
+        "estimate": f"{name}_estimate *estimate",
+        "work": "WORK *work",
     }
+    function = translate("step_graph", nodes, known, inputs, OUTPUTS, shared, parameters, True)
+    start, _ = start_of(filter_)
+    common = common_values([function], shared)
     values = {
         "name": name,
         "NAME": name.upper(),
         "origin": origin,
         "version": __version__,
+        "model_version": __version__,
+        "command": "export slip",
+        "subject": "slip and speed of a rover without odometry, row by row",
         "wheels": filter_.table.wheels,
         "grounds": start.shape[0],
         "columns": start.shape[1],
@@ -74,16 +83,15 @@ def write_slip_c(
         "codes": CODES,
         "flags": FLAGS,
         "function": function,
-        "arrays": arrays,
-        "constants": [array(*parts) for parts in used],
         "prior": array("prior", start[:, 0].astype(np.float32), "float"),
         "begin": start[0, 1:].tolist(),
-        "kernels": kernel_texts(shared),
         "identity": {key: metadata[key] for key in IDENTITY},
         "possible": POSSIBLE,
-        "finite": [f"all_finite(out_{key}, {prod(s)})" for key, (_, s) in function.outputs.items()],
         "load": (float(filter_.table.load[0]), float(filter_.table.load[-1])),
-        **sizes,
+        **common,
+        "work_bytes": common["array_bytes"] + 4 * (len(FLAGS) + 4 + len(QUANTILES)),
+        "state_bytes": 4 * (start.size + RECENT + 2),
+        "constant_bytes": common["constant_bytes"] + 4 * start.shape[0],
     }
     environment = template_environment()
     environment.loader.searchpath.append(str(Path(__file__).parent))

@@ -49,13 +49,13 @@ def slip_step_model(filter_: SlipFilter, least_speed: float, gravity: float) -> 
     of the 90 % interval with the median between; slip (3, k) likewise; no_soil and beyond (1,);
     flags (`FLAGS`,), 1 where set.
     """
-    graph, step = Graph(), _Step(filter_)
+    graph = Graph()
     k, n = len(filter_.table.wheels), filter_.table.pull.shape[2]
     read = {
         name: Value(graph, name)
         for name in ("grounds", "recent", "rim_speed", "torque", "load", "slope", "elapsed")
     }
-    step.add(graph, read, least_speed, gravity)
+    _Step(graph, filter_).add(read, least_speed, gravity)
     begin = constant(graph, start_of(filter_)[0])
     graph.op("Identity", begin.name, out="start")
     shapes: dict[str, list[Any]] = {
@@ -81,213 +81,180 @@ def start_of(filter_: SlipFilter) -> tuple[Floats, Floats]:
 
 
 class _Step:
-    """The parts of a step; arrays of grounds are (n, 1), those of wheels lists of k."""
+    """The parts of a step; arrays of grounds are (n, 1), those of grounds and wheels (n, k)."""
 
-    def __init__(self, filter_: SlipFilter) -> None:
-        self.filter, self.table, self.errors = filter_, filter_.table, filter_.errors
-        self.ratio = travel_ratio(self.table.slip)
-        self.n, self.k = self.table.pull.shape[2], len(self.table.wheels)
-        self.soils = len(self.table.values)
+    def __init__(self, graph: Graph, filter_: SlipFilter) -> None:
+        self.graph, self.filter, self.table = graph, filter_, filter_.table
+        self.errors, self.ratio = filter_.errors, travel_ratio(filter_.table.slip)
+        self.k = len(filter_.table.wheels)
 
-    def add(self, graph: Graph, read: dict[str, Value], least_speed: float, gravity: float) -> None:
+    def add(self, read: dict[str, Value], least_speed: float, gravity: float) -> None:
         """Append all nodes; the outputs get their names."""
-        rims, recent = read["rim_speed"], read["recent"]
+        recent = read["recent"]
         # in reverse all signs change
-        way = where(rims.take([0], 0) < 0.0, constant(graph, [-1.0]), 1.0)
-        raw = rims * way
-        usable = (raw.reduce("ReduceMin", 0, True) > least_speed).astype(np.float32)
-        middle_raw, before = raw.reduce("ReduceMean", 0, True), recent.take([1], 0)
-        change = absolute(middle_raw - before) / (read["elapsed"].clip(TINY) * gravity)
+        way = where(read["rim_speed"].take([0], 0) < 0.0, constant(self.graph, [-1.0]), 1.0)
+        raw = read["rim_speed"] * way
+        usable = as_float(raw.reduce("ReduceMin", 0, True) > least_speed)
+        middle, before = raw.reduce("ReduceMean", 0, True), recent.take([1], 0)
+        change = absolute(middle - before) / (read["elapsed"].clip(TINY) * gravity)
         uneven = where(before > 0.0, change, 0.0)
-        steady = (uneven <= float(self.errors.pull_std)).astype(np.float32)
-        standing = (absolute(rims).reduce("ReduceMax", 0, True) <= least_speed).astype(np.float32)
-        sound = usable * steady
-        raw = where(usable > 0.5, raw, float(least_speed) + constant(graph, np.ones(self.k)))
+        sound = usable * as_float(uneven <= float(self.errors.pull_std))
+        standing = as_float(absolute(raw).reduce("ReduceMax", 0, True) <= least_speed)
+        raw = where(usable > 0.5, raw, float(least_speed) + constant(self.graph, np.ones(self.k)))
         torque = read["torque"] * way
-        size, most = absolute(torque), constant(graph, self.filter.most_torque)
+        size, most = absolute(torque), constant(self.graph, self.filter.most_torque)
         seen = size <= most
-        wild = (size > most).astype(np.float32) * (size < FAR).astype(np.float32)
-        torque = where(seen, torque, 0.0)
-        slope = read["slope"] * way
+        wild = (as_float(size > most) * as_float(size < FAR)).reduce("ReduceMax", 0, True)
         load = read["load"].clip(float(self.table.load[0]), float(self.table.load[-1]))
         rim, apart, kept = self._rims(recent.take([0], 0), raw)
-        curves = ForceCurves(graph, self.table, rim, load)
-        pull = curves.pull()
-        sin, cos = slope.node("Sin"), slope.node("Cos")
-        share = constant(graph, self.filter._share[:, None])
-        found = self._balance(graph, pull, (sin + share) * self.filter.weight)
-        hot, part, missing, rise, place = found
-        error = cos * float(self.filter.weight * self.errors.slope_std)
-        ends = [curves.torques(i, hot) for i in range(self.k)]
-        risen = [b - a for a, b in ends]
-        model = [a + part * d for (a, _), d in zip(ends, risen, strict=True)]
-        common = [d / rise * error for d in risen]
-        step = (hot * constant(graph, np.diff(-self.ratio)[None])).sum(1, True)
-        floor = constant(graph, self.table.floor[:, None].astype(float))
-        loads = [load.take([i], 0) for i in range(self.k)]
-        spread = []
-        for i in range(self.k):
-            of_speed = d_squared(risen[i] / step * float(self.errors.speed_std)) * kept
-            of_floor = d_squared(loads[i] * float(FLOOR_NOISE * self.table.radius[i]))
-            spread.append(of_speed * (1.0 - floor) + of_floor * floor)
-        weight, mean, cov = self._mixed(read["grounds"])
-        torques = [torque.take([i], 0) for i in range(self.k)]
-        there = [seen.astype(np.float32).take([i], 0) for i in range(self.k)]
-        after, new_mean, new_cov, misfit = self._weigh(
-            weight, mean, cov, torques, there, model, spread, common, loads, missing
-        )
-        ratio = self._ratio_at(graph, place + error * constant(graph, self.filter._row[:, None])
-                               / rise)  # fmt: skip
-        speed = ratio * rim.reduce("ReduceMax", 0, True)
+        curves = ForceCurves(self.graph, self.table, rim, load)
+        slope = read["slope"] * way
+        share = constant(self.graph, self.filter._share[:, None])
+        needed = (slope.node("Sin") + share) * self.filter.weight
+        hot, part, missing, rise, place = self._balance(curves.pull(), needed)
+        error = slope.node("Cos") * float(self.filter.weight * self.errors.slope_std)
+        ends = [curves.torques(wheel, hot) for wheel in range(self.k)]
+        low, high = (concat(own, 1) for own in zip(*ends, strict=True))
+        risen = high - low
+        step = (hot * constant(self.graph, np.diff(-self.ratio)[None])).sum(1, True)
+        floor = constant(self.graph, self.table.floor[:, None].astype(float))
+        of_speed = squared(risen / step * float(self.errors.speed_std)) * kept
+        of_floor = squared(load * constant(self.graph, FLOOR_NOISE * self.table.radius))
+        likely = self._weigh(
+            read["grounds"], where(seen, torque, 0.0), as_float(seen), low + part * risen,
+            of_speed * (1.0 - floor) + of_floor * floor, risen / rise * error, load, missing,
+        )  # fmt: skip
+        after, misfit, grounds = likely
+        row = constant(self.graph, self.filter._row[:, None])
+        speed = self._ratio_at(place + error * row / rise) * rim.reduce("ReduceMax", 0, True)
         no_soil = (after * floor).sum(0, True).reshape(1)
-        beyond = (after * (missing > 0.0).astype(np.float32)).sum(0, True).reshape(1)
-        answer, quantiles = self._speeds(graph, after, speed)
-        self._outputs(graph, read, {
-            "sound": sound, "way": way, "rim": rim, "answer": answer, "quantiles": quantiles,
-            "after": after, "apart": apart, "middle": middle_raw, "misfit": misfit,
-            "no_soil": no_soil, "beyond": beyond, "standing": standing, "usable": usable,
-            "wild": wild.reduce("ReduceMax", 0, True),
-        }, new_mean, new_cov)  # fmt: skip
+        beyond = (after * as_float(missing > 0.0)).sum(0, True).reshape(1)
+        # a row that is passed over changes nothing
+        where(sound > 0.5, grounds, read["grounds"]).named("grounds_out")
+        old = recent.take(range(2, RECENT), 0)
+        misfits = concat([misfit, recent.take(range(2, RECENT - 1), 0)], 0)
+        judged = where(sound > 0.5, misfits, old)
+        parts = [
+            where(sound > 0.5, apart, recent.take([0], 0)),
+            where(usable > 0.5, middle, before),
+        ]
+        concat([*parts, judged], 0).reshape(RECENT).named("recent_out")
+        widest = self._name_answer(after, speed, way, rim)
+        concat([no_soil, beyond], 0).reshape(2).named("probability")
+        refused = as_float(no_soil > LIKELY)
+        answered = sound * (1.0 - refused)
+        flags = [
+            standing,
+            (1.0 - sound) * (1.0 - standing),
+            refused * sound,
+            self._misfits(judged) * answered,
+            as_float(beyond > LIKELY) * answered,
+            as_float(widest > WIDE) * answered,
+            wild * sound,
+        ]
+        concat(flags, 0).reshape(len(FLAGS)).named("flags")
 
     def _rims(self, apart: Value, rim: Value) -> tuple[Value, Value, Value]:
         """As `SlipFilter._rims`."""
         middle = rim.reduce("ReduceMean", 0, True)
         away = rim - middle
-        now = d_squared(away / middle).sum(0, True) * (1.0 / max(self.k - 1, 1))
+        now = squared(away / middle).sum(0, True) * (1.0 / max(self.k - 1, 1))
         joined = where(apart > 0.0, apart * ROWS_ALIKE + now * (1.0 - ROWS_ALIKE), now)
         kept = (1.0 - float(self.errors.speed_std**2) / joined.clip(TINY)).clip(0.0)
         return middle + kept * away, joined, kept
 
-    def _balance(
-        self, graph: Graph, pull: Value, needed: Value
-    ) -> tuple[Value, Value, Value, Value, Value]:
+    def _balance(self, pull: Value, needed: Value) -> tuple[Value, Value, Value, Value, Value]:
         """Which interval holds the least slip that pulls enough (n, m - 1), the share of the way in
         it, pull that is missing, rise, and the place (n, 1)."""
         m = len(self.table.slip)
         enough = (pull >= needed).astype(np.float32)
-        before = enough @ constant(graph, np.triu(np.ones((m, m)), 1))
+        before = enough @ constant(self.graph, np.triu(np.ones((m, m)), 1))
         first = enough * (before < 0.5).astype(np.float32)
         known = enough.reduce("ReduceMax", 1, True)
         begin, second, rest = first.split([1, 1, m - 2], 1)
         hot = concat([second + begin, rest], 1)
         last = np.eye(1, m - 1, m - 2)
-        hot = hot + (1.0 - known) * constant(graph, last)
+        hot = hot + (1.0 - known) * constant(self.graph, last)
         low = (pull.columns(0, m - 1) * hot).sum(1, True)
         high = (pull.columns(1, m) * hot).sum(1, True)
         rise = (high - low).clip(1e-3 * float(self.filter.weight))
         share = where(known > 0.5, ((needed - low) / rise).clip(0.0, 1.0), 1.0)
         missing = where(known > 0.5, 0.0 * rise, needed - pull.reduce("ReduceMax", 1, True))
-        place = (hot * constant(graph, np.arange(m - 1)[None])).sum(1, True) + share
+        place = (hot * constant(self.graph, np.arange(m - 1)[None])).sum(1, True) + share
         return hot, share, missing, rise, place
 
-    def _mixed(self, grounds: Value) -> tuple[Value, list[list[Value]], list[list[Value]]]:
-        """As `SlipFilter._mixed`: weight, means [2][k] and covariances [3][k], (n, 1) each."""
-        graph, k = grounds.graph, self.k
-        old, *rest = grounds.split([1, *[k] * 5], 1)
+    def _mixed(self, grounds: Value) -> tuple[Value, list[Value], list[Value]]:
+        """As `SlipFilter._mixed`: weight (n, 1), two means and three covariances (n, k) each."""
+        old, *rest = grounds.split([1, *[self.k] * 5], 1)
         kept = old * (1.0 - CHANGE)
-        weight = kept + constant(graph, CHANGE * self.filter._prior[:, None])
+        weight = kept + constant(self.graph, CHANGE * self.filter._prior[:, None])
         same = kept / weight
-        means, covs = rest[:2], rest[2:]
+        means, covs, other = rest[:2], rest[2:], 1.0 - same
         middle = [(old * mean).sum(0, True) for mean in means]
         apart = [mean - one for mean, one in zip(means, middle, strict=True)]
         squares = [apart[0] * apart[0], apart[0] * apart[1], apart[1] * apart[1]]
         first = [self.errors.loss_std**2, 0.0, self.errors.gain_std**2]
-        other = 1.0 - same
-        new_means = [(same * mean + other * one) * KEPT
-                     for mean, one in zip(means, middle, strict=True)]  # fmt: skip
+        new_means = [
+            (same * mean + other * one) * KEPT for mean, one in zip(means, middle, strict=True)
+        ]
         new_covs = []
         for cov, square, begin in zip(covs, squares, first, strict=True):
             pooled = (old * (cov + square)).sum(0, True)
             mixed = same * cov + other * pooled + same * other * square
             new_covs.append(mixed * KEPT**2 + float((1.0 - KEPT**2) * begin))
-        split = [part.split(k, 1) for part in (*new_means, *new_covs)]
-        return weight, split[:2], split[2:]
+        return weight, new_means, new_covs
 
     def _weigh(
-        self,
-        weight: Value,
-        mean: list[list[Value]],
-        cov: list[list[Value]],
-        torque: list[Value],
-        there: list[Value],
-        model: list[Value],
-        spread: list[Value],
-        common: list[Value],
-        load: list[Value],
-        missing: Value,
-    ) -> tuple[Value, list[Value], list[Value], Value]:
-        """As `SlipFilter._weigh`: weights (n, 1), means and covariances (n, k) each, misfit."""
+        self, grounds: Value, torque: Value, there: Value, model: Value, spread: Value,
+        common: Value, load: Value, missing: Value,
+    ) -> tuple[Value, Value, Value]:  # fmt: skip
+        """As `SlipFilter._weigh`: weights (n, 1), misfit (1,), and the grounds after the row."""
+        weight, mean, cov = self._mixed(grounds)
         constant_noise, share = self.filter.noise
-        gains, variances, residuals, parts = [], [], [], []
-        precision: Any = 1.0
-        shared: Any = 0.0
-        for i in range(self.k):
-            noise = d_squared(torque[i]) * float(share**2 + MODEL_NOISE**2) + float(
-                constant_noise**2
-            )
-            gain = (cov[0][i] + cov[1][i] * model[i], cov[1][i] + cov[2][i] * model[i])
-            variance = gain[0] + gain[1] * model[i] + (noise + spread[i])
-            residual = torque[i] - float(self.errors.loss) - model[i] - mean[0][i] - (
-                mean[1][i] * model[i])  # fmt: skip
-            own = common[i] * there[i]
-            precision = own * own / variance + precision
-            shared = own * residual / variance + shared
-            gains.append(gain)
-            variances.append(variance)
-            residuals.append(residual)
-            parts.append(own)
-        shared = shared / precision
-        squares: Any = 0.0
-        volume: Any = 0.0
-        strange: Any = 0.0
-        for i in range(self.k):
-            wide = d_squared(load[i] * float(OUTLIER_STD * self.table.radius[i]))
-            squares = d_squared(residuals[i]) / variances[i] * there[i] + squares
-            volume = log(variances[i]) * there[i] + volume
-            strange = (d_squared(residuals[i]) / wide + log(wide)) * there[i] + strange
-        squares = squares - d_squared(shared) * precision
+        noise = squared(torque) * float(share**2 + MODEL_NOISE**2) + float(constant_noise**2)
+        gains = [cov[0] + cov[1] * model, cov[1] + cov[2] * model]
+        variance = gains[0] + gains[1] * model + (noise + spread)
+        residual = torque - float(self.errors.loss) - model - mean[0] - mean[1] * model
+        own = common * there
+        precision = (own * own / variance).sum(1, True) + 1.0
+        shared = (own * residual / variance).sum(1, True) / precision
+        squares = (squared(residual) / variance * there).sum(1, True) - squared(shared) * precision
+        volume = (log(variance) * there).sum(1, True)
+        wide = squared(load * constant(self.graph, OUTLIER_STD * self.table.radius))
+        strange = ((squared(residual) / wide + log(wide)) * there).sum(1, True)
         sound = (squares + log(precision) + volume) * -0.5 + float(np.log1p(-OUTLIER))
         glitch = strange * -0.5 + float(np.log(OUTLIER))
         larger = sound.node("Max", glitch)
         both = larger + log(exp(sound - larger) + exp(glitch - larger))
-        used = exp(sound - both)
+        used = exp(sound - both) * there
         scale = float(1.0 / (self.errors.pull_std * self.filter.weight))
-        logs = both * POWER - d_squared(missing * scale) * 0.5 + log(weight)
+        logs = both * POWER - squared(missing * scale) * 0.5 + log(weight)
         after = exp(logs - logs.reduce("ReduceMax", 0, True))
         after = after / after.sum(0, True)
-        new_mean: list[list[Value]] = [[], []]
-        new_cov: list[list[Value]] = [[], [], []]
-        for i in range(self.k):
-            variance = variances[i] + parts[i] * parts[i] / precision
-            left = residuals[i] - parts[i] * shared
-            step = [used * there[i] * own / variance for own in gains[i]]
-            for c in range(2):
-                new_mean[c].append(mean[c][i] + step[c] * left)
-            for c, (a, b) in enumerate(((0, 0), (0, 1), (1, 1))):
-                new_cov[c].append(cov[c][i] - step[a] * gains[i][b])
-        seen = there[0]
-        for one in there[1:]:
-            seen = seen + one
-        misfit = (after * squares).sum(0, True).reshape(1) / seen.clip(1.0)
-        return (after, [concat(one, 1) for one in new_mean], [concat(one, 1) for one in new_cov],
-                misfit)  # fmt: skip
+        variance, left = variance + own * own / precision, residual - own * shared
+        steps = [used * gain / variance for gain in gains]
+        means = [one + step * left for one, step in zip(mean, steps, strict=True)]
+        pairs = zip(cov, ((0, 0), (0, 1), (1, 1)), strict=True)
+        covs = [one - steps[a] * gains[b] for one, (a, b) in pairs]
+        misfit = (after * squares).sum(0, True).reshape(1) / there.sum(0, True).clip(1.0)
+        return after, misfit, concat([after, *means, *covs], 1)
 
-    def _ratio_at(self, graph: Graph, place: Value) -> Value:
+    def _ratio_at(self, place: Value) -> Value:
         """Travel over rolling (n, 1) at places of the table."""
         m = len(self.table.slip)
-        away = absolute(place.clip(0.0, float(m - 1)) - constant(graph, np.arange(m)[None]))
-        return ((1.0 - away).clip(0.0) * constant(graph, self.ratio[None])).sum(1, True)
+        away = absolute(place.clip(0.0, float(m - 1)) - constant(self.graph, np.arange(m)[None]))
+        return ((1.0 - away).clip(0.0) * constant(self.graph, self.ratio[None])).sum(1, True)
 
-    def _speeds(self, graph: Graph, weight: Value, speed: Value) -> tuple[list[Value], list[Value]]:
+    def _speeds(self, weight: Value, speed: Value) -> tuple[list[Value], list[Value]]:
         """Mean and standard deviation (1,) of the speed, and its quantiles, rising."""
         mean = (weight * speed).sum(0, True)
-        std = sqrt((weight * d_squared(speed - mean)).sum(0, True) + TINY)
+        std = sqrt((weight * squared(speed - mean)).sum(0, True) + TINY)
         # the share of a ground whose speed is below a place: a ramp as wide as they are apart, so
         # that rounding moves no ground from one side to the other
         gap = float(PLACES[1] - PLACES[0])
-        under = (constant(graph, PLACES[None] / gap + 0.5) - (speed - mean) / (std * gap)).clip(
-            0.0, 1.0
-        )
+        under = (
+            constant(self.graph, PLACES[None] / gap + 0.5) - (speed - mean) / (std * gap)
+        ).clip(0.0, 1.0)
         distribution = (weight * under).sum(0, True)  # (1, places)
         count = len(PLACES)
         low, high = distribution.columns(0, count - 1), distribution.columns(1, count)
@@ -298,55 +265,33 @@ class _Step:
             found.append((mean + std * steps).reshape(1))
         return [mean.reshape(1), std.reshape(1)], found
 
-    def _outputs(
-        self,
-        graph: Graph,
-        read: dict[str, Value],
-        made: dict[str, Any],
-        mean: list[Value],
-        cov: list[Value],
-    ) -> None:
-        """Name the outputs; a row that is passed over changes nothing."""
-        sound, way, recent = made["sound"], made["way"], read["recent"]
-        grounds = concat([made["after"], *mean, *cov], 1)
-        where(sound > 0.5, grounds, read["grounds"]).named("grounds_out")
-        old = recent.take(range(2, RECENT), 0)
-        misfits = concat([made["misfit"], recent.take(range(2, RECENT - 1), 0)], 0)
-        new = concat([where(sound > 0.5, made["apart"], recent.take([0], 0)),
-                      where(made["usable"] > 0.5, made["middle"], recent.take([1], 0)),
-                      where(sound > 0.5, misfits, old)], 0)  # fmt: skip
-        new.reshape(RECENT).named("recent_out")
-        low, median, high = made["quantiles"]
+    def _name_answer(self, weight: Value, speed: Value, way: Value, rim: Value) -> Value:
+        """Name the outputs `speed` and `slip`; the widest interval of a slip, (1,)."""
+        (mean, spread), (low, median, high) = self._speeds(weight, speed)
         forward = way > 0.0
-        ends = [where(forward, low, -high), where(forward, median, -median),
-                where(forward, high, -low)]  # fmt: skip
-        first, spread = made["answer"]
-        concat([first * way, spread, *ends], 0).reshape(2 + len(QUANTILES)).named("speed")
-        slips = [slip_of((v / made["rim"]).clip(*RATIO_ENDS)) for v in (high, median, low)]
-        slip = concat([s.reshape(1, self.k) for s in slips], 0)
+        ends = [
+            where(forward, one, -other)
+            for one, other in ((low, high), (median, median), (high, low))
+        ]
+        concat([mean * way, spread, *ends], 0).reshape(2 + len(QUANTILES)).named("speed")
+        slips = [slip_of((v / rim).clip(*RATIO_ENDS)) for v in (high, median, low)]
+        slip = concat([one.reshape(1, self.k) for one in slips], 0)
         slip.reshape(len(QUANTILES), self.k).named("slip")
-        no_soil, beyond = made["no_soil"], made["beyond"]
-        concat([no_soil, beyond], 0).reshape(2).named("probability")
+        return (slips[2] - slips[0]).reduce("ReduceMax", 0, True).reshape(1)
+
+    def _misfits(self, judged: Value) -> Value:
+        """Whether the last rows have more misfit than sound ones, 0 or 1, (1,)."""
         degrees = float(JUDGED * self.k)
         limit = chi_squared_quantile(degrees, QUANTILE) / degrees
-        judged = where(sound > 0.5, misfits, old)
-        full = (judged.reduce("ReduceMin", 0, True) >= 0.0).astype(np.float32)
-        misfit = (judged.reduce("ReduceMean", 0, True) > float(limit)).astype(np.float32) * full
-        width = (slips[2] - slips[0]).reduce("ReduceMax", 0, True).reshape(1)
-        refused = (no_soil > LIKELY).astype(np.float32)
-        answered = sound * (1.0 - refused)
-        flags = [
-            made["standing"],
-            (1.0 - sound) * (1.0 - made["standing"]),
-            refused * sound,
-            misfit * answered,
-            (beyond > LIKELY).astype(np.float32) * answered,
-            (width > WIDE).astype(np.float32) * answered,
-            made["wild"] * sound,
-        ]
-        concat(flags, 0).reshape(len(FLAGS)).named("flags")
+        full = as_float(judged.reduce("ReduceMin", 0, True) >= 0.0)
+        return as_float(judged.reduce("ReduceMean", 0, True) > float(limit)) * full
 
 
-def d_squared(x: Value) -> Value:
+def squared(x: Value) -> Value:
     """x times itself."""
     return x * x
+
+
+def as_float(condition: Value) -> Value:
+    """1 where a condition is true, else 0."""
+    return condition.astype(np.float32)

@@ -244,26 +244,21 @@ def _sensor_wheel() -> tuple[str, str, str]:
     import numpy as np
 
     from soilml.io.text_tables import csv_text
-    from soilml.systems.rim_stress import (
-        MohrCoulomb,
-        SensingWheel,
-        SteadyRun,
-        balanced_arc,
-        simulate_readings,
-    )
+    from soilml.physics.soils import soil
+    from soilml.systems.rim_stress import SensingWheel, SteadyRun, balanced_arc, simulate_readings
 
-    wheel, sand = SensingWheel(), MohrCoulomb(friction_angle=0.6632)
+    wheel, sand = SensingWheel(), soil("nagatani2009/toyoura_sand")
     rng, runs = np.random.default_rng(4), {}
     readings: dict[str, list[Any]] = {"run": [], "angle_rad": [], "sensor": [], "force_N": []}
     for k, (slip, slope) in enumerate(((0.11, 0), (0.18, 2), (0.29, 4), (0.39, 6))):
         at = SteadyRun(slip=slip, weight=28.92, slope=np.deg2rad(slope))
-        arc = balanced_arc(np.deg2rad(30.0), at, wheel, sand, shear_modulus=0.0072)
+        arc = balanced_arc(np.deg2rad(30.0), at, wheel, sand)
         found = simulate_readings(arc, wheel, turns=5, crown=0.3, lugs=(0.3, 0.3), seed=k)
-        near = np.abs(found.angle) < 1.0
-        columns = (found.angle.round(5), found.sensor.astype(int), found.force.round(4))
+        near = np.abs(found["angle_rad"]) < 1.0
         readings["run"] += [f"slope_{slope}"] * int(near.sum())
-        for name, values in zip(list(readings)[1:], columns, strict=True):
-            readings[name] += values[near].tolist()
+        for name, values in found.items():
+            digits = 4 if name == "force_N" else 5
+            readings[name] += values[near].round(digits).tolist()
         read = round(slip + 0.01 * (1.0 - slip) * float(rng.standard_normal()), 4)
         runs[f"slope_{slope}"] = (read, 0.01, 28.92, 0.3, round(float(at.slope), 5))
     names = ("slip", "slip_std", "load_N", "load_N_std", "slope_rad")
@@ -290,23 +285,21 @@ def _wheel_leg() -> tuple[str]:
 
     from soilml.io.text_tables import csv_text
     from soilml.systems.wheel_legs.stride_relations import (
-        LINEAR,
         S_I,
         S_Z,
-        SIMPLIFIED,
-        SINKAGE,
-        TORQUE_SLIP,
-        VIBRATION_SLIP,
+        SINKAGE_ERRORS,
+        TORQUE,
+        VIBRATION,
     )
 
     rng, columns = np.random.default_rng(4), dict[str, list[Any]]()
-    relations = (TORQUE_SLIP["simplified"], VIBRATION_SLIP["linear"])
+    errors = (TORQUE.errors, VIBRATION.errors, SINKAGE_ERRORS)
     for k, name, angle in ((0, "SSC-1", 0.7381), (3, "ES-3", 0.6254)):
         slip, noise = np.linspace(0.1, 0.4, 12), rng.standard_normal((3, 12))
-        angles = [angle * (1.0 + 0.01 * e.friction[k]) for e in (SIMPLIFIED, LINEAR, SINKAGE)]
+        angles = [angle * (1.0 + 0.01 * own.friction[k]) for own in errors]
         read = []
-        for relation, phi, z in zip(relations, angles, noise, strict=False):
-            p, q, r, s = relation.single or (0.0, 0.0, 0.0, 0.0)
+        for relation, phi, z in zip((TORQUE, VIBRATION), angles, noise, strict=False):
+            (p, q), (r, s) = relation.at_none, relation.rate
             y = (phi - relation.to_soil[0, 0]) / relation.to_soil[0, 1]
             read.append((slip + 0.03 * z - p - y * r) / (q + y * s))
         sunk = (angles[2] - S_I) / S_Z * (1.0 + 0.05 * noise[2])

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import OutputFile
-from soilml.errors import InputError
 
 if TYPE_CHECKING:
     from soilml.identification.fit import Fit
@@ -21,14 +20,14 @@ RUNS.csv.
   soilml identify MODEL.toml RUNS.csv --out result.json
   soilml identify MODEL.toml RUNS.csv --free cohesion,friction_angle
   soilml identify MODEL.toml RUNS.csv --method linear --where run=sand_3
-  soilml identify MODEL.toml RUNS.csv --by run --mean
+  soilml identify MODEL.toml RUNS.csv --by run
 
 RUNS.csv has the columns run, slip, load_N, torque_Nm (blank where not
 measured) and optionally drawbar_pull_N, sinkage_m and <column>_std. Rows whose
 status is not ok are ignored. A channel is used where its noise is declared, in
 [noise] or by <column>_std. All rows are assumed to come from one soil, unless
---by run asks for a result for each run; --mean averages them. Rows of several
-wheels name theirs, one of [gears.NAME] in MODEL.toml, in the column gear.
+--by run asks for a result for each run. Rows of several wheels name theirs,
+one of [gears.NAME] in MODEL.toml, in the column gear.
 
 Methods:
   averaged   (default) the soil averaged over explanations of the rows, each
@@ -50,7 +49,6 @@ ARGUMENTS = (
     "free",
     "effects",
     "by",
-    ("--mean", "with --by: the mean of the groups too"),
     "rows",
     ("--out FILE.json", "write the result to this file", OutputFile),
     "report",
@@ -76,14 +74,11 @@ def run(args: argparse.Namespace) -> int:
     from soilml.optional_imports import need
     from soilml.remarks import texts
 
-    if args.mean and args.by is None:
-        raise InputError("--mean averages groups: name their column, such as --by run")
     need("scipy", "identify")
     from soilml.experiment_design.next_rows import advice_after_fit
     from soilml.experiment_design.presentation import advice_as_json, next_row_remarks
     from soilml.identification import identify
     from soilml.identification.report import fit_report, group_report, soil_entries
-    from soilml.systems.tracked_robot.group_identification import GroupFits
 
     table = read_rows(args, RUNS)
     effects = available_effects(args)
@@ -107,16 +102,12 @@ def run(args: argparse.Namespace) -> int:
     title = f"Soil of {Path(args.runs).name}, by the model {Path(args.model).name}"
     fits = {name: fit for name, (fit, _, _) in found.items()}
     runs = {name: own for name, (_, own, _) in found.items()}
-    mean: Fit | None = None
     if args.by is None:
         (content,), ((fit, _, steps),) = runs.values(), found.values()
         report = fit_report(fit, steps, title)
     else:
         content = {"by": args.by, "runs": runs, "failed": failed}
-        if args.mean:
-            mean = GroupFits(tuple(fits.values())).average
-            content["mean"] = mean.as_json() | soil_entries(case, mean, with_draws=False)
-        report = group_report(fits, failed, args.by, title, mean)
+        report = group_report(fits, failed, args.by, title)
     deliver(args, report, content)
     tell_failures(args.by, failed)
     return 0

@@ -47,6 +47,7 @@ ARGUMENTS = (
     ("--sensors N (4)", "number in the row", whole_number_from(1, 1000)),
     ("--out FILE.csv", "write the table to this file", OutputFile),
     ("--picture FILE.png", "draw k_x, pull and slope against slip", OutputFile),
+    "report",
 )
 
 
@@ -56,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.config.case import read_case_of_one_gear
     from soilml.physics.effects import EFFECTS
     from soilml.physics.gears import Wheel
-    from soilml.systems.rim_stress import MohrCoulomb, SensingWheel, solve_runs
+    from soilml.systems.rim_stress import SensingWheel, solve_runs
     from soilml.systems.rim_stress.tables import (
         read_readings,
         read_steady_runs,
@@ -82,10 +83,7 @@ def run(args: argparse.Namespace) -> int:
         if args.readings is None
         else read_readings(args.readings, wheel)
     )
-    strength = MohrCoulomb(friction_angle=soil.friction_angle, cohesion=soil.cohesion)
-    found = solve_runs(
-        runs, stresses, wheel, strength, args.reference, discs=discs, model=(case.model, soil)
-    )
+    found = solve_runs(runs, stresses, wheel, soil, args.reference, discs=discs, model=case.model)
     report = found.report(f"Pull of {args.model} from the stress on its rim")
     deliver(args, report, columns=found.columns)
     return 0

@@ -25,10 +25,10 @@ inclination_rad (tail down) where they were measured, --spacing apart.
 
 A row of the output is a run: slip, pull of one track, sinkage, what the model
 predicts of them, and the angles at which the belt meets and leaves the soil
-(fig. 8). The picture has pull and sinkage, the line of the belt (fig. 7) and
-the angles. --grousers adds the pull of discrete grousers (eqs. 10 to 14), with
-f_g, the friction of soil that has yielded, as an input: the paper does not
-print it.
+(fig. 8). The picture has these; the page of --report has the line of the belt
+(fig. 7) too. --grousers adds the pull of discrete grousers (eqs. 10 to 14),
+with f_g, the friction of soil that has yielded, as an input: the paper does
+not print it.
 """
 ARGUMENTS = (
     ("model MODEL.toml", "track, soil and its priors", InputFile),
@@ -38,7 +38,8 @@ ARGUMENTS = (
     ("--grousers PITCH,TIP,FG,JK", "pitch and tip (m), f_g, and j_k (m)"),
     "gear",
     ("--out FILE.csv", "write the table to this file", OutputFile),
-    ("--picture FILE.png", "draw pull, sinkage, belt and angles", OutputFile),
+    ("--picture FILE.png", "draw pull, sinkage and angles", OutputFile),
+    "report",
 )
 
 

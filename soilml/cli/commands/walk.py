@@ -20,15 +20,14 @@ legs, grounds and commanded slips.
 
   soilml paper walk --foot LTF,CIF --stiffness 0.4e6:1e6:4 --picture feet.png
   soilml paper walk --foot none --legs 1:6:6 --stiffness 0.7e6
-  soilml paper walk --ground SSC-1,ES-3 --slip 0,0.25,0.5 --over-time turn.csv
+  soilml paper walk --ground SSC-1,ES-3 --slip 0,0.25,0.5 --picture slips.png
 
 Feet are none, LTF (Load Testing Foot), SRF and CIF (table III); grounds SSC-1,
 SSC-2, SSC-3 and ES-3 (table I), or --stiffness, the stress in N/m^3 of depth
 under a flat plate. A row has means, root mean squares and largest values over
 the last full turn, and the sinkage at midstance. Without --slip the wheel
-rolls freely. --over-time has the motion of that turn. The picture shows it,
-or, where legs, stiffness or slip have three values or more, the row's values
-against them.
+rolls freely. The picture shows the row's values against legs, stiffness or
+slip, that of them which has three values or more.
 
 The stress is proportional to the depth: --offset adds the stress at the
 surface. Neighbouring legs do not act on each other, and the body is a plate
@@ -43,9 +42,8 @@ ARGUMENTS = (
     ("--offset", "with the stress at the surface"),
     ("--mass KG", "carried (default: 3.75 kg)", NumberFrom(0.01, 1e5, "kg")),
     ("--angular-speed RAD_S", "default: 0.3 rad/s", NumberFrom(1e-3, 100.0, "rad/s")),
-    ("--over-time FILE.csv", "write the motion of the last turn", OutputFile),
     ("--out FILE.csv", "write the table to this file", OutputFile),
-    ("--picture FILE.png", "draw the walks, or values against legs, stiffness, slip", OutputFile),
+    ("--picture FILE.png", "draw the values against legs, stiffness or slip", OutputFile),
 )
 
 
@@ -56,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.option_values import parse_names, parse_numbers
     from soilml.cli.output import tell, write_columns
     from soilml.cli.progress import working
-    from soilml.systems.wheel_legs.gaits import walk_tables
+    from soilml.systems.wheel_legs.gaits import walk_picture, walk_table
 
     feet = parse_names(args.foot) or []
     counts = parse_numbers("--legs", args.legs)
@@ -71,11 +69,10 @@ def run(args: argparse.Namespace) -> int:
     given = {"mass": args.mass, "speed": args.angular_speed}
     changes = {name: value for name, value in given.items() if value is not None}
     with working("simulating the walks"):
-        found = walk_tables(feet, counts.astype(int).tolist(), _grounds(args), slips, **changes)
-    drawn = None if args.picture is None else found.picture
-    more = {} if args.over_time is None else {args.over_time: found.motion}
-    write_columns(found.columns, args.out, args.picture, drawn, more)
-    status = np.asarray(found.columns["status"])
+        found = walk_table(feet, counts.astype(int).tolist(), _grounds(args), slips, **changes)
+    drawn = None if args.picture is None else walk_picture(found)
+    write_columns(found, args.out, args.picture, drawn)
+    status = found["status"]
     for reason in dict.fromkeys(status[status != "ok"].tolist()):
         tell(f"{np.sum(status == reason)} of {status.size} walks: {reason}")
     return 0

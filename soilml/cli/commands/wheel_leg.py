@@ -18,7 +18,7 @@ from the strides of a wheel-leg, by the relations that Comin and Saaj 2017
 print, and what they mean for a heavy rover that is to follow.
 
   soilml paper wheel-leg STRIDES.csv
-  soilml paper wheel-leg STRIDES.csv --by run --torque-model empirical
+  soilml paper wheel-leg STRIDES.csv --by run
 
 STRIDES.csv has a row for each stride: run, slip, and one or more of torque_Nm
 (at midstance), vibration_m_s2 (largest acceleration after it) and sinkage_m
@@ -42,8 +42,6 @@ another train a file on its strides: soilml train slip_torque.
 SENSORS = {"torque_Nm": "torque", "vibration_m_s2": "vibration", "sinkage_m": "sinkage"}
 ARGUMENTS = (
     ("runs STRIDES.csv", "strides: CSV, Parquet or .xlsx", InputFile),
-    ("--torque-model NAME (simplified)", "terramechanics, empirical or simplified"),
-    ("--vibration-model NAME (linear)", "planar, or linear, which needs one stride"),
     ("--assume NAME=VALUE,...", "n, cohesion (Pa) or shear_modulus (m) where they are known"),
     ("--wheel R,B,N", "of the heavy rover: m, m and load in N (default: 0.15,0.18,490.5)"),
     ("--known SOIL", "name of table I, or degrees,Pa: give the slip on this soil"),
@@ -51,6 +49,7 @@ ARGUMENTS = (
     "ignore-extra",
     ("--out FILE.csv", "write the table to this file", OutputFile),
     ("--picture FILE.png", "draw the soil by sensor, or the slip by stride", OutputFile),
+    "report",
 )
 
 
@@ -66,12 +65,6 @@ def run(args: argparse.Namespace) -> int:
     return _slip(args, table) if known else _soil(args, table)
 
 
-def _options(args: argparse.Namespace) -> dict[str, Any]:
-    """The options that soil and slip share."""
-    names = ("torque_model", "vibration_model")
-    return {name: getattr(args, name) for name in names}
-
-
 def _slip(args: argparse.Namespace, table: Table) -> int:
     """The slip of each stride on a known soil."""
     import numpy as np
@@ -83,15 +76,12 @@ def _slip(args: argparse.Namespace, table: Table) -> int:
     sensors = {
         SENSORS[name]: table[name] for name in ("torque_Nm", "vibration_m_s2") if name in table
     }
-    found = slip_of_strides(sensors, *_known_soil(args.known), **_options(args))
     columns = {"run": table["run"]} | ({"slip_measured": table["slip"]} if "slip" in table else {})
-    for name, values in found.by_sensor.items():
-        columns |= {f"slip_by_{name}": values, f"slip_by_{name}_std": found.std[name]}
-    columns |= {"slip": found.fused, "slip_std": found.fused_std, "in_range": found.in_range}
+    columns |= slip_of_strides(sensors, *_known_soil(args.known))
     numbered = {**columns, "stride": np.arange(1, len(table) + 1)}
     panel = tuple(name for name in columns if name.startswith("slip") and not name.endswith("_std"))
     write_columns(columns, args.out, args.picture, column_picture(numbered, "stride", [panel]))
-    outside = int(np.count_nonzero(~found.in_range & np.isfinite(found.fused)))
+    outside = int(np.count_nonzero(~columns["in_range"] & np.isfinite(columns["slip"])))
     if outside:
         tell(f"{outside} of {len(table)} slips are outside of the 0 to 0.5 of the relations")
     return 0
@@ -124,18 +114,23 @@ def _soil(args: argparse.Namespace, table: Table) -> int:
     from soilml.cli.output import deliver
     from soilml.cli.tables import result_by_group
     from soilml.systems.wheel_legs import Mobility, StrideSoil, mobility, soil_of_strides
-    from soilml.systems.wheel_legs.strides import stride_report
+    from soilml.systems.wheel_legs.strides import stride_columns, stride_report
 
     heavy = _heavy(args)
 
     def estimate(rows: Table) -> tuple[StrideSoil, Mobility]:
         readings = {sensor: rows[name] for name, sensor in SENSORS.items() if name in rows}
-        soil = soil_of_strides(rows["slip"], readings, **_options(args))
+        soil = soil_of_strides(rows["slip"], readings)
         return soil, mobility(soil, **heavy)
 
     found, failed = result_by_group(args, table, "estimating", estimate)
-    report, rows = stride_report(found, failed, args.by)
-    deliver(args, report, columns=rows)
+    columns: dict[str, list[Any]] = {}
+    for name, (soil, means) in found.items():
+        own = stride_columns(soil, means)
+        group = {} if args.by is None else {args.by: [name] * len(soil.sensors)}
+        for key, values in (group | own).items():
+            columns.setdefault(key, []).extend(values)
+    deliver(args, stride_report(found, failed, args.by), columns=columns)
     return 0
 
 

@@ -235,43 +235,20 @@ def largest_pressure(contact: Contact, soil: Soil) -> Array:
     return (soil.kc / contact.width + soil.kphi) * xp.exp(soil.n * xp.log(depth))
 
 
-@dataclass(frozen=True, kw_only=True)
-class RigidWheel(ABC):
-    """A rigid cylinder in the soil, for any assumption on the stresses along its arc.
+class RoundGear(ABC):
+    """What gears share whose rim or sole is an arc of a circle in the soil."""
 
-    `braking` names the law of shear while it brakes (`soilml.physics.gears.rigid_wheel`).
-    """
-
-    radius: Annotated[Real, Parameter("m", 0.005, 5.0, "r, radius of the rim")]
-    width: Annotated[Real, Parameter("m", 0.002, 5.0, "b, width of the rim")]
-    braking: BrakingLaw = "displacement-sign"
-
-    def __post_init__(self) -> None:
-        check_law(self.braking)
+    radius: Real
+    width: Real
 
     @final
     def largest_sinkage(self) -> Real:
-        """The radius, m: the hub is at the free surface."""
+        """The radius, m: the centre of the circle is at the free surface."""
         return self.radius
 
     @final
-    def initial_sinkage(self, soil: Soil, at: Operating) -> Array:
-        r"""Sinkage under normal stress alone, m, where the search begins.
-
-        .. math::
-            z = \left[\frac{3 W}{(3 - n) (k_c + b k_\varphi) \sqrt{2 r}}\right]^{2 / (2 n + 1)}
-
-        References: Bekker 1969, eq. for the towed rigid wheel; good for n below 1.3.
-        """
-        xp = namespace(at.load)
-        modulus = soil.kc + self.width * soil.kphi
-        divisor = xp.maximum(3.0 - soil.n, xp.full_like(3.0 - soil.n, SMALLEST_DIVISOR))
-        base = 3.0 * at.load / (divisor * modulus * xp.sqrt(2.0 * self.radius))
-        return base ** (2.0 / (2.0 * soil.n + 1.0))
-
-    @final
     def contact_geometry(self, sinkage: Array, soil: Soil, at: Operating) -> WheelArc:
-        r"""The arc of a wheel at this sinkage (m) that leaves the soil straight below its axle.
+        r"""The arc at this sinkage (m) that leaves the soil straight below the centre.
 
         .. math::
             \theta_1 = \arccos(1 - z / r), \quad \theta_2 = 0, \quad
@@ -299,6 +276,36 @@ class RigidWheel(ABC):
         inside = (geometry.peak > geometry.exit) & (geometry.peak < geometry.entry)
         ok = xp.zeros_like(geometry.entry, dtype=xp.int64)
         return xp.where(inside, ok, ok + int(Status.NO_PEAK))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidWheel(RoundGear):
+    """A rigid cylinder in the soil, for any assumption on the stresses along its arc.
+
+    `braking` names the law of shear while it brakes (`soilml.physics.gears.rigid_wheel`).
+    """
+
+    radius: Annotated[Real, Parameter("m", 0.005, 5.0, "r, radius of the rim")]
+    width: Annotated[Real, Parameter("m", 0.002, 5.0, "b, width of the rim")]
+    braking: BrakingLaw = "displacement-sign"
+
+    def __post_init__(self) -> None:
+        check_law(self.braking)
+
+    @final
+    def initial_sinkage(self, soil: Soil, at: Operating) -> Array:
+        r"""Sinkage under normal stress alone, m, where the search begins.
+
+        .. math::
+            z = \left[\frac{3 W}{(3 - n) (k_c + b k_\varphi) \sqrt{2 r}}\right]^{2 / (2 n + 1)}
+
+        References: Bekker 1969, eq. for the towed rigid wheel; good for n below 1.3.
+        """
+        xp = namespace(at.load)
+        modulus = soil.kc + self.width * soil.kphi
+        divisor = xp.maximum(3.0 - soil.n, xp.full_like(3.0 - soil.n, SMALLEST_DIVISOR))
+        base = 3.0 * at.load / (divisor * modulus * xp.sqrt(2.0 * self.radius))
+        return base ** (2.0 / (2.0 * soil.n + 1.0))
 
 
 LIFTED = 1e-9  # Sinkage of a slice that is out of the soil, as a fraction of the wheel's

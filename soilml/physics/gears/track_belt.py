@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from soilml.arrays import Array, Real, namespace
-from soilml.numerics.quadrature import Nodes, columns, crowded_ends, crowded_start, gauss
+from soilml.numerics.quadrature import columns, crowded_ends, crowded_start, gauss
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
 from soilml.physics.operating_point import Operating
 
@@ -149,59 +149,53 @@ def belt_contact(belt: Belt, at: Operating, entry: int, middle: int, short: int)
     # behind the rear wheel, unloaded from the depth `second`:
     out = xp.minimum(inclination_at_height(belt.rebound * second, belt.radius), belt.exit)
     segments = (
-        (FRONT, (belt.entry, level), None, crowded_start(entry)),
-        (FRONT, (level, -released), first, gauss(short)),
-        (MIDDLE, (-belt.leave, -off), first, crowded_ends(middle)),
-        (MIDDLE, (on, deeper), first, crowded_ends(middle)),
-        (MIDDLE, (deeper, belt.meet), None, gauss(short)),
-        (REAR, (met, rear_deeper), first, gauss(short)),
-        (REAR, (rear_deeper, level), None, gauss(short)),
-        (REAR, (level, -out), second, gauss(short)),
+        (FRONT, belt.entry, level, crowded_start(entry)),
+        (FRONT, level, -released, gauss(short)),
+        (MIDDLE, -belt.leave, -off, crowded_ends(middle)),
+        (MIDDLE, on, deeper, crowded_ends(middle)),
+        (MIDDLE, deeper, belt.meet, gauss(short)),
+        (REAR, met, rear_deeper, gauss(short)),
+        (REAR, rear_deeper, level, gauss(short)),
+        (REAR, level, -out, gauss(short)),
     )
-    parts = [_segment_contact(belt, at, *segment) for segment in segments]
+    parts = []
+    for arc, start, end, nodes in segments:
+        x, weight = columns(nodes, belt.entry)
+        area = belt.width * arc_radius(belt, arc) * xp.abs(end - start) * weight
+        parts.append(_belt_points(belt, at, arc, start + (end - start) * x, area))
     by_point = (
         *("depth", "shear_displacement", "surface_travel"),
         *("area", "horizontal_area", "frontal_area"),
     )
     joined = {name: xp.concat([getattr(p, name) for p in parts], axis=0) for name in by_point}
-    return Contact(**joined, shear_lever_arm=belt.radius, width=belt.width)
+    return replace(parts[0], **joined)
 
 
-def _segment_contact(
-    belt: Belt,
-    at: Operating,
-    arc: int,
-    ends: tuple[Array, Array],
-    deepest: Array | None,
-    nodes: Nodes,
-) -> Contact:
-    """Points of a segment between two inclinations (rad) on one arc.
+def _belt_points(belt: Belt, at: Operating, arc: int, inclination: Array, area: Array) -> Contact:
+    """Points of one arc at inclinations (rad), each of an area (m^2); arrays (points, batch).
 
-    `deepest` (m) is the depth to which the soil under it was loaded before, None where the belt
-    loads it deeper than ever.
+    A point presses the soil deeper than ever, or rests on soil that was unloaded from the depth of
+    the front wheel, behind the lowest point of the rear wheel from that one's.
     """
-    xp = namespace(belt.entry)
-    x, weight = columns(nodes, belt.entry)
-    start, end = ends
-    inclination = start + (end - start) * x
+    xp = namespace(inclination)
     height = height_above_front(belt, arc, inclination)
     along, horizontal = distance_along(belt, arc, inclination)
-    shear_displacement = along - (1.0 - at.slip) * horizontal
-    if deepest is not None:
-        unloaded_by = height - (belt.sinkage - deepest)
-        depth = equivalent_depth(belt, deepest, unloaded_by)
-        shear_displacement = shear_displacement * shear_retention(belt, deepest, unloaded_by)
-    elif arc == FRONT:  # as a product: near the entry a difference would lose its digits
-        sin_half = xp.sin(0.5 * (belt.entry - inclination)) * xp.sin(
-            0.5 * (belt.entry + inclination)
-        )
-        depth = 2.0 * belt.radius * sin_half
-    else:
-        depth = belt.sinkage - height
-    area = belt.width * arc_radius(belt, arc) * xp.abs(end - start) * weight
+    behind = inclination < 0.0
+    depth, deepest = belt.sinkage - height, belt.sinkage + 0.0 * height
+    if arc == REAR:
+        deepest = xp.where(behind, belt.rear + 0.0 * height, deepest)
+    virgin = depth > deepest
+    unloaded_by = deepest - depth
+    if arc == FRONT:  # as a product: near the entry a difference would lose its digits
+        both = 0.5 * (belt.entry - inclination), 0.5 * (belt.entry + inclination)
+        depth = 2.0 * belt.radius * xp.sin(both[0]) * xp.sin(both[1])
+        virgin = ~behind
+    pressed = xp.where(virgin, depth, equivalent_depth(belt, deepest, unloaded_by))
+    sheared = along - (1.0 - at.slip) * horizontal
+    retained = sheared * shear_retention(belt, deepest, unloaded_by)
     return Contact(
-        depth=xp.maximum(depth, xp.full_like(depth, SMALLEST_DEPTH)),
-        shear_displacement=shear_displacement,
+        depth=xp.maximum(pressed, xp.full_like(pressed, SMALLEST_DEPTH)),
+        shear_displacement=xp.where(virgin, sheared, retained),
         surface_travel=along,
         area=area,
         horizontal_area=area * xp.cos(inclination),
@@ -218,39 +212,21 @@ def belt_profile(belt: Belt, at: Operating, points: int) -> tuple[Array, Contact
     front_end = distance_along(belt, FRONT, -belt.leave)[0]
     middle_end = distance_along(belt, MIDDLE, belt.meet)[0]
     along = fraction * distance_along(belt, REAR, -belt.exit)[0]
+    # inclination that the point would have on each of the three arcs
+    arcs = (
+        belt.entry - along / belt.radius,
+        (along - front_end) / belt.arc_radius - belt.leave,
+        belt.meet - (along - middle_end) / belt.radius,
+    )
+    none = xp.zeros_like(along)
+    parts = [_belt_points(belt, at, arc, angle, none) for arc, angle in enumerate(arcs)]
 
     def of_its_arc(front: Array, middle: Array, rear: Array) -> Array:
         return xp.where(along < front_end, front, xp.where(along < middle_end, middle, rear))
 
-    # inclination that the point would have on each of the three arcs
-    arcs = (
-        (FRONT, belt.entry - along / belt.radius),
-        (MIDDLE, (along - front_end) / belt.arc_radius - belt.leave),
-        (REAR, belt.meet - (along - middle_end) / belt.radius),
-    )
-    inclination = of_its_arc(*(angle for _, angle in arcs))
-    depth = belt.sinkage - of_its_arc(
-        *(height_above_front(belt, arc, angle) for arc, angle in arcs)
-    )
-    behind_rear = (along >= middle_end) & (inclination < 0.0)
-    before_front = (along < front_end) & (inclination >= 0.0)
-    deepest = xp.where(behind_rear, belt.rear + 0.0 * along, belt.sinkage + 0.0 * along)
-    virgin, unloaded_by = before_front | (depth > deepest), deepest - depth
-    pressed = xp.where(virgin, depth, equivalent_depth(belt, deepest, unloaded_by))
-    displacements = (
-        travel - (1.0 - at.slip) * horizontal
-        for travel, horizontal in (distance_along(belt, *arc) for arc in arcs)
-    )
-    sheared = of_its_arc(*displacements)
-    retained = sheared * shear_retention(belt, deepest, unloaded_by)
-    none = xp.zeros_like(along)
-    return inclination, Contact(
-        depth=xp.maximum(pressed, none + SMALLEST_DEPTH),
-        shear_displacement=xp.where(virgin, sheared, retained),
+    return of_its_arc(*arcs), replace(
+        parts[0],
+        depth=of_its_arc(*(part.depth for part in parts)),
+        shear_displacement=of_its_arc(*(part.shear_displacement for part in parts)),
         surface_travel=along,
-        area=none,
-        horizontal_area=none,
-        frontal_area=none,
-        shear_lever_arm=belt.radius,
-        width=belt.width,
     )

@@ -11,42 +11,23 @@ from soilml.numerics.quadrature import between
 from soilml.parameters import Parameter
 from soilml.physics.contact import Contact, Resolution
 from soilml.physics.gears.rigid_wheel import (
+    RoundGear,
     WheelArc,
     contact_at,
-    entry_angle,
     pressed_depth,
     reversals,
 )
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
-from soilml.row_status import Status
 
 #: Nodes in each part of the contact, two parts when driving and three when braking.
 NODES = {Resolution.FULL: 16, Resolution.FIT: 16, Resolution.COARSE: 5}
 LARGEST_INITIAL = 0.5  # Largest initial sinkage, as a fraction of the radius
 
 
-@dataclass(frozen=True)
-class Sole:
-    """The part of a foot's circle that is in the soil; angles from straight down, (batch,).
-
-    The foot's arc ends at `top`: at `entry`, where its circle meets the surface, while the foot
-    is not wholly under it (low sinkage), else at the arc's own end. Where that lies below `peak`
-    (high sinkage) the stress is still rising there.
-    """
-
-    entry: Array  # rad, theta_1, of the circle
-    peak: Array  # rad, theta_m, of the circle
-    top: Array  # rad, the smaller of theta_1 and theta_1w
-    sinkage: Array  # m
-    radius: Real  # m
-    width: Real  # m
-    hub_offset: Real  # m, d, height of the hub above the centre of the arc
-
-
 @final
 @dataclass(frozen=True, kw_only=True)
-class Midstance:
+class Midstance(RoundGear):
     r"""A wheel-leg while one leg stands upright: a wheel of its foot's radius, cut at its foot.
 
     .. math::
@@ -101,10 +82,6 @@ class Midstance:
         """The sole of the whole foot, m^2: the patch A_s of the shear modulus K = K_A sqrt(A_s)."""
         return self.radius * self.arc * self.width
 
-    def largest_sinkage(self) -> Real:
-        """The radius, m: the centre of the foot's arc is at the free surface."""
-        return self.radius
-
     def initial_sinkage(self, soil: Soil, at: Operating) -> Array:
         """Sinkage of a plate of the foot's area, m, at most half the radius."""
         xp = namespace(at.load)
@@ -112,70 +89,44 @@ class Midstance:
         sinkage = (pressure / (soil.kc / self.width + soil.kphi)) ** (1.0 / soil.n)
         return xp.minimum(sinkage, LARGEST_INITIAL * self.radius + 0.0 * sinkage)
 
-    def contact_geometry(self, sinkage: Array, soil: Soil, at: Operating) -> Sole:
-        """The sole of a foot at this sinkage (m), its heel end straight below the hub."""
-        xp = namespace(sinkage)
-        entry = entry_angle(sinkage, self.radius)
-        return Sole(
-            entry=entry,
-            peak=(soil.a0 + soil.a1 * at.slip) * entry,
-            top=xp.minimum(entry, self.arc + 0.0 * entry),
-            sinkage=sinkage,
-            radius=self.radius,
-            width=self.width,
-            hub_offset=self.leg_length + self.tip_height - self.radius,
-        )
-
-    def geometry_status(self, geometry: Sole) -> Array:
-        """`Status.NO_PEAK` where the maximum stress does not lie on the circle's arc, else 0."""
-        xp = namespace(geometry.entry)
-        ok = xp.zeros_like(geometry.entry, dtype=xp.int64)
-        inside = (geometry.peak > 0) & (geometry.peak < geometry.entry)
-        return xp.where(inside, ok, ok + int(Status.NO_PEAK))
-
     def contact(
-        self, geometry: Sole, at: Operating, resolution: Resolution = Resolution.FULL
+        self, geometry: WheelArc, at: Operating, resolution: Resolution = Resolution.FULL
     ) -> Contact:
-        """The points along the sole."""
-        return _sole_contact(geometry, at, NODES[resolution])
+        """Parts that end at the maximum stress and where a braking foot's shear turns round."""
+        xp = namespace(geometry.entry)
+        top = self._top(geometry)
+        heel = 0.0 * top  # straight below the hub
+        inner = [xp.minimum(geometry.peak, top)]
+        if bool(xp.any(at.slip < 0)):
+            # the heel is not behind the hub, where a second reversal could be
+            reversal, exists = reversals(geometry.entry, heel, at.slip)
+            first = xp.where(exists[0, :], reversal[0, :], 0.5 * top)
+            inner.append(xp.minimum(first, top))
+        return self._points(geometry, at, *between(heel, inner, top, NODES[resolution]))
 
-    def profile_contact(self, geometry: Sole, at: Operating, points: int) -> tuple[Array, Contact]:
+    def profile_contact(
+        self, geometry: WheelArc, at: Operating, points: int
+    ) -> tuple[Array, Contact]:
         """Evenly spaced points from the top of the sole to below the hub, without area."""
         xp = namespace(geometry.entry)
         fraction = xp.linspace(1.0, 0.0, points, dtype=geometry.entry.dtype)[:, None]
-        angle = fraction * geometry.top
-        return angle, _contact_at(geometry, at, angle, xp.zeros_like(angle))
+        angle = fraction * self._top(geometry)
+        return angle, self._points(geometry, at, angle, xp.zeros_like(angle))
 
+    def _top(self, rim: WheelArc) -> Array:
+        """Where the sole ends (rad): at the surface while the foot is not wholly under it.
 
-def _sole_contact(sole: Sole, at: Operating, count: int) -> Contact:
-    """Parts that end at the maximum stress and where a braking foot's shear changes direction."""
-    xp = namespace(sole.entry)
-    heel = 0.0 * sole.top  # straight below the hub
-    inner = [xp.minimum(sole.peak, sole.top)]
-    if bool(xp.any(at.slip < 0)):
-        # the heel is not behind the hub, where a second reversal could be
-        reversal, exists = reversals(sole.entry, heel, at.slip)
-        first = xp.where(exists[0, :], reversal[0, :], 0.5 * sole.top)
-        inner.append(xp.minimum(first, sole.top))
-    return _contact_at(sole, at, *between(heel, inner, sole.top, count))
+        Where its own end lies below the maximum stress the stress is still rising there.
+        """
+        return namespace(rim.entry).minimum(rim.entry, self.arc + 0.0 * rim.entry)
 
-
-def _contact_at(sole: Sole, at: Operating, angle: Array, arc: Array) -> Contact:
-    """Contact at these angles (rad), each representing `arc` (rad); arrays (points, batch)."""
-    xp = namespace(angle)
-    circle = WheelArc(
-        entry=sole.entry,
-        exit=xp.zeros_like(sole.entry),
-        peak=sole.peak,
-        sinkage=sole.sinkage,
-        radius=sole.radius,
-        shear_radius=sole.radius,
-        lever=sole.radius,
-        width=sole.width,
-    )
-    depth = pressed_depth(circle, angle)
-    return replace(
-        contact_at(circle, at, sole.entry - angle, depth, arc, "slip-sign"),
-        shear_lever_arm=sole.radius + sole.hub_offset * xp.cos(angle),
-        normal_lever_arm=-sole.hub_offset * xp.sin(angle),
-    )
+    def _points(self, rim: WheelArc, at: Operating, angle: Array, arc: Array) -> Contact:
+        """Contact at these angles (rad), each representing `arc` (rad); arrays (points, batch)."""
+        xp = namespace(angle)
+        hub_offset = self.leg_length + self.tip_height - self.radius
+        passed, depth = rim.entry - angle, pressed_depth(rim, angle)
+        return replace(
+            contact_at(rim, at, passed, depth, arc, "slip-sign"),
+            shear_lever_arm=self.radius + hub_offset * xp.cos(angle),
+            normal_lever_arm=-hub_offset * xp.sin(angle),
+        )

@@ -9,13 +9,7 @@ import numpy as np
 
 from soilml.arrays import Floats, Real
 from soilml.errors import FitError
-from soilml.systems.rim_stress.climbs import (
-    Rover,
-    WheelRun,
-    count_apart,
-    pull_of_rover,
-    wheel_components,
-)
+from soilml.systems.rim_stress.climbs import Rover, WheelRun, count_apart
 from soilml.systems.rim_stress.ground import GroundEstimate
 from soilml.systems.rim_stress.stress import StressProfile
 
@@ -128,26 +122,30 @@ def compare_stress(
     The scatter is that of the profiles on level ground about their polynomial in slip. None without
     two slips on level ground, or without a slope within them. References: Nagatani et al., Fig. 7.
     """
-    flat = np.asarray([wheel.slip for wheel in level])
-    within = [w for w in slopes if len(flat) and flat.min() <= w.slip <= flat.max()]
-    distinct = count_apart(flat, MIN_SLIP_DIFFERENCE)
-    if distinct < 2 or not within:
+    flat = [wheel.slip for wheel in level]
+    within = [w for w in slopes if flat and min(flat) <= w.slip <= max(flat)]
+    if count_apart(flat, MIN_SLIP_DIFFERENCE) < 2 or not within:
         return None
-    degree = int(np.clip(distinct - 2, 1, MAX_DEGREE))
-    x = np.vander(flat, degree + 1)
-    y, own = (np.stack([_ends_and_centre(w.profile) for w in runs]) for runs in (level, within))
-    fit = np.linalg.lstsq(x, y, rcond=None)[0]
-    variance = ((y - x @ fit) ** 2).sum(axis=0) / max(len(x) - degree - 1, 1)
-    at = np.vander([w.slip for w in within], degree + 1)
+    fit = StressBySlip.fit(level)
+    slips = np.asarray([wheel.slip for wheel in within])
+    own, expected = (
+        _ends_and_centre(numbers)
+        for numbers in (np.stack([_reduce(w.profile) for w in within]), fit.numbers(slips))
+    )
+    x, at = (np.vander(slip, fit.degree + 1) for slip in (fit.slip, slips))
+    scatter = _ends_and_centre(fit.fitted + fit.residual) - _ends_and_centre(fit.fitted)
     mean = at.mean(axis=0)
     share = 1.0 / len(within) + mean @ np.linalg.pinv(x.T @ x) @ mean
-    std = np.sqrt(variance * share)
-    return StressComparison((own - at @ fit).mean(axis=0), std, runs=len(within))
+    std = np.sqrt((scatter**2).mean(axis=0) * share)
+    return StressComparison((own - expected).mean(axis=0), std, runs=len(within))
 
 
-def _ends_and_centre(profile: StressProfile) -> Floats:
-    centre = profile.angle @ profile.normal / profile.normal.sum()
-    return np.asarray([profile.exit_angle, profile.entry_angle, centre])
+def _ends_and_centre(numbers: Floats) -> Floats:
+    """Exit, entry and centre of the stress (n, 3), of profiles as `_reduce` has them."""
+    shape = numbers[:, 2:]
+    place = shape @ np.linspace(0.0, 1.0, POINTS) / shape.sum(axis=1)
+    centre = numbers[:, 0] + place * (numbers[:, 1] - numbers[:, 0])
+    return np.column_stack([numbers[:, :2], centre])
 
 
 @dataclass(frozen=True)
@@ -252,6 +250,6 @@ def pull_and_slope_at(
     profiles: Of front and rear. shear: Cohesion (Pa), friction angle (rad) and k_x (m), (n,) each.
     """
     cohesion, friction, modulus = shear
-    wheels = [wheel_components(WheelRun(slip, profile), rover, modulus) for profile in profiles]
-    forces = pull_of_rover(rover, wheels, cohesion, np.tan(friction), front_share)
-    return forces.pull(0.0), forces.equilibrium_slope()
+    parts = rover.parts([WheelRun(slip, profile) for profile in profiles], modulus)
+    pull = rover.pull(parts, cohesion, np.tan(friction), front_share)
+    return pull.pull(0.0), pull.equilibrium_slope()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -77,6 +78,42 @@ class Rover:
         across, along = 0.5 * self.weight * np.cos(slope), 0.5 * self.weight * np.sin(slope)
         front = self.front_share * across - self.height_ratio * along
         return front, across - front
+
+    def parts(self, wheels: Sequence[WheelRun], modulus: Real) -> list[Floats]:
+        """The components of the forces of each wheel at each k_x (m), (3, 3, ...)."""
+        return [
+            force_components(wheel.profile, wheel.slip, modulus, self.radius, self.width)
+            for wheel in wheels
+        ]
+
+    def pull(
+        self,
+        parts: Sequence[Floats],
+        cohesion: Real,
+        tangent: Real,
+        front_share: Real | None = None,
+    ) -> SlopePull:
+        r"""Drawbar pull 2 (F_xf + F_xr) of a rover whose wheels carry its weight, by the slope.
+
+        Each wheel's ratio of pull to load on soil without cohesion is :math:`\rho`, and M of each
+        wheel follows from its load (`loads`):
+
+        .. math::
+            F_x = m g [(a \rho_f + (1 - a) \rho_r) \cos\alpha + h (\rho_r - \rho_f) \sin\alpha]
+                  + 2 c \sum (C_x - \rho C_z)
+
+        parts: The components of front and rear. front_share: Other than that of the rover.
+
+        References: Nagatani et al., eqs. 6, 7, 10 and 11.
+        """
+        share = self.front_share if front_share is None else front_share
+        front, rear = (SlopePull.of_wheel(own, self.weight, cohesion, tangent) for own in parts)
+        return SlopePull(
+            weight=self.weight,
+            cos_term=share * front.cos_term + (1.0 - share) * rear.cos_term,
+            sin_term=self.height_ratio * (rear.cos_term - front.cos_term),
+            constant=2.0 * (front.constant + rear.constant),
+        )
 
 
 @dataclass(frozen=True)
@@ -190,42 +227,6 @@ def count_apart(values: Sequence[float] | Floats, apart: float) -> int:
     return count
 
 
-def wheel_components(wheel: WheelRun, rover: Rover, modulus: Real) -> Floats:
-    """The components of a wheel's forces at each k_x (m), (3, 3, ...)."""
-    return force_components(wheel.profile, wheel.slip, modulus, rover.radius, rover.width)
-
-
-def pull_of_rover(
-    rover: Rover,
-    wheels: Sequence[Floats],
-    cohesion: Real,
-    tangent: Real,
-    front_share: Real | None = None,
-) -> SlopePull:
-    r"""Drawbar pull 2 (F_xf + F_xr) of a rover whose wheels carry its weight, by the slope.
-
-    Each wheel's ratio of pull to load on soil without cohesion is :math:`\rho`, the loads are
-    :math:`a \cos\alpha - h \sin\alpha` and :math:`(1 - a) \cos\alpha + h \sin\alpha` times the
-    weight, and M of each wheel follows from its load:
-
-    .. math::
-        F_x = m g [(a \rho_f + (1 - a) \rho_r) \cos\alpha + h (\rho_r - \rho_f) \sin\alpha]
-              + 2 c \sum (C_x - \rho C_z)
-
-    wheels: The components of front and rear. front_share: Other than that of the rover.
-
-    References: Nagatani et al., eqs. 6, 7, 10 and 11.
-    """
-    share = rover.front_share if front_share is None else front_share
-    front, rear = (SlopePull.of_wheel(own, rover.weight, cohesion, tangent) for own in wheels)
-    return SlopePull(
-        weight=rover.weight,
-        cos_term=share * front.cos_term + (1.0 - share) * rear.cos_term,
-        sin_term=rover.height_ratio * (rear.cos_term - front.cos_term),
-        constant=2.0 * (front.constant + rear.constant),
-    )
-
-
 @dataclass(frozen=True)
 class ForceBalances:
     """The climbs of one rover, with wheel forces tabulated over the range of k_x."""
@@ -239,10 +240,8 @@ class ForceBalances:
     def tabulate(cls, rover: Rover, climbs: Sequence[Climb], modulus: Prior) -> ForceBalances:
         """Tabulate the wheel forces between the ends of the prior of k_x (m)."""
         knots = np.linspace(np.log(modulus.lower) - MARGIN, np.log(modulus.upper) + MARGIN, KNOTS)
-        front, rear = (
-            np.stack([wheel_components(c.wheels[i], rover, np.exp(knots)) for c in climbs], axis=2)
-            for i in range(2)
-        )
+        each = [rover.parts(climb.wheels, np.exp(knots)) for climb in climbs]
+        front, rear = (np.stack(wheel, axis=2) for wheel in zip(*each, strict=True))
         return cls(rover, tuple(climbs), knots, (front, rear))
 
     def residuals(self, soils: Floats) -> Floats:
@@ -256,7 +255,7 @@ class ForceBalances:
         share = position - knot
         wheels = [v[..., knot] * (1.0 - share) + v[..., knot + 1] * share for v in self.wheels]
         slope = np.asarray([climb.slope for climb in self.climbs])[:, None]
-        pull = pull_of_rover(self.rover, wheels, cohesion, np.tan(friction)).pull(slope)
+        pull = self.rover.pull(wheels, cohesion, np.tan(friction)).pull(slope)
         return np.asarray(pull - self.rover.weight * np.sin(slope)).T
 
     def whitener(self, shear: ShearParameters, noise: Uncertainty) -> tuple[Floats, Floats]:
@@ -280,32 +279,33 @@ def balance_std(
     `shear`: the effective variance of the balance. References: Orear, Am. J. Phys. 50(10), 1982.
     """
     cohesion, tangent, modulus = shear[0], float(np.tan(shear[1])), shear[2]
-    a = rover.front_share
 
     def residual(
-        wheels: Sequence[WheelRun] = climb.wheels, slope: float = climb.slope, share: float = a
+        wheels: Sequence[WheelRun] = climb.wheels,
+        slope: float = climb.slope,
+        share: float = rover.front_share,
     ) -> float:
-        parts = [wheel_components(wheel, rover, modulus) for wheel in wheels]
-        pull = pull_of_rover(rover, parts, cohesion, tangent, share).pull(slope)
+        pull = rover.pull(rover.parts(wheels, modulus), cohesion, tangent, share).pull(slope)
         return float(pull - rover.weight * np.sin(slope))
 
     # a speed read too high gives slips that are too low
     faster = [replace(w, slip=1.0 - (1.0 - w.slip) * (1.0 + STEP)) for w in climb.wheels]
     ahead = [wheel.with_entry(STEP) for wheel in climb.wheels]
     moved = [residual(faster), residual(ahead), residual(slope=climb.slope + STEP)]
-    moved.append(residual(share=a * (1.0 + STEP)))
+    moved.append(residual(share=rover.front_share * (1.0 + STEP)))
     by_speed, by_entry, by_slope, by_share = (np.asarray(moved) - residual()) / STEP
     independent = [noise.speed_m_s.share * by_speed, noise.slope_rad * by_slope]
     independent.append(noise.front_load * by_share)
     # at a given load more stress at one angle means less elsewhere, and counts by the difference
     # of ratios of pull to load
-    for wheel, load in zip(climb.wheels, rover.loads(climb.slope), strict=True):
-        parts = wheel_components(wheel, rover, modulus)
+    loads = rover.loads(climb.slope)
+    for wheel, parts, load in zip(
+        climb.wheels, rover.parts(climb.wheels, modulus), loads, strict=True
+    ):
         scale = float(magnification(parts, load, cohesion, tangent))
         pull, lift = _per_stress(wheel, rover, tangent, modulus)
-        ratio = float(pull_ratio(parts, tangent))
-        by_stress = 2.0 * scale * (pull - ratio * lift) * wheel.normal_std
-        independent.append(float(np.linalg.norm(by_stress)))
+        by_stress = 2.0 * scale * (pull - float(pull_ratio(parts, tangent)) * lift)
+        independent.append(float(np.linalg.norm(by_stress * wheel.normal_std)))
     std = float(np.linalg.norm(independent))
     return std, noise.speed_scale * by_speed, noise.entry_angle_rad * by_entry
 
@@ -332,15 +332,16 @@ def modulus_per_climb(
 
     References: Nagatani et al., section 6.2 and Fig. 8.
     """
-    moduli, tangent = [], float(np.tan(friction_angle))
-    for climb in climbs:
+    tangent = float(np.tan(friction_angle))
 
-        def pull(modulus: Floats, climb: Climb = climb) -> Floats:
-            parts = [wheel_components(wheel, rover, modulus) for wheel in climb.wheels]
-            return np.asarray(pull_of_rover(rover, parts, cohesion, tangent).pull(climb.slope))
+    def modulus(climb: Climb) -> float:
+        def pull(k: Floats) -> Floats:
+            found = rover.pull(rover.parts(climb.wheels, k), cohesion, tangent)
+            return np.asarray(found.pull(climb.slope))
 
         try:
-            moduli.append(find_modulus(pull, float(rover.weight * np.sin(climb.slope))))
+            return find_modulus(pull, rover.weight * math.sin(climb.slope))
         except FitError:
-            moduli.append(np.nan)
-    return np.asarray(moduli)
+            return math.nan
+
+    return np.asarray([modulus(climb) for climb in climbs])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, final
@@ -14,8 +15,9 @@ from soilml.parameters import Parameter, check
 from soilml.physics.contact import Stress, integrate
 from soilml.physics.gears.rigid_wheel import WheelArc, contact_at
 from soilml.physics.operating_point import MOST_SLIP, Operating
+from soilml.physics.soils import Soil
 from soilml.remarks import Remark
-from soilml.systems.rim_stress.stress import StressProfile
+from soilml.systems.rim_stress.stress import SensingWheel, StressProfile
 
 LIFT, PULL, TORQUE = range(3)  # First axis of components: N, N and N m
 #: Range of k_x that is searched, m: shear mobilised at once, and hardly any in a wheel's contact;
@@ -44,17 +46,15 @@ class SteadyRun:
     def __post_init__(self) -> None:
         check(self, "run: ")
 
+    @property
+    def load(self) -> float:
+        """Load perpendicular to the slope, N."""
+        return float(self.weight) * math.cos(float(self.slope))
 
-@final
-@dataclass(frozen=True, kw_only=True)
-class MohrCoulomb:
-    """Shear strength parameters of the soil, which must be known beforehand."""
-
-    friction_angle: Annotated[Real, Parameter("rad", 0.0, 1.4, "phi")]
-    cohesion: Annotated[Real, Parameter("Pa", 0.0, 1e6, "c")] = 0.0
-
-    def __post_init__(self) -> None:
-        check(self, "strength: ")
+    @property
+    def required(self) -> float:
+        """Pull that the slope requires, N."""
+        return float(self.weight) * math.sin(float(self.slope))
 
 
 def force_components(
@@ -178,6 +178,44 @@ class SlopePull:
         net_weight = self.weight - self.sin_term
         sine = np.clip(self.constant / np.hypot(net_weight, self.cos_term), -1.0, 1.0)
         return np.arctan2(self.cos_term, net_weight) + np.arcsin(sine)
+
+
+@dataclass(frozen=True)
+class WheelBalance:
+    """The force balance of a wheel (radius, width, m) on soil of known strength (Pa, tan(phi))."""
+
+    radius: float
+    width: float
+    cohesion: float
+    tangent: float
+
+    @staticmethod
+    def of(wheel: SensingWheel, soil: Soil) -> WheelBalance:
+        """Of a wheel on a soil, whose cohesion and friction angle count."""
+        size = float(wheel.radius), float(wheel.width)
+        return WheelBalance(*size, float(soil.cohesion), math.tan(float(soil.friction_angle)))
+
+    def parts(self, profile: StressProfile, at: SteadyRun, modulus: Real) -> Floats:
+        """`force_components` at k_x (m)."""
+        return force_components(profile, float(at.slip), modulus, self.radius, self.width)
+
+    def pull(self, profile: StressProfile, at: SteadyRun, modulus: Real) -> Real:
+        """Drawbar pull (N) under the load of the run; NaN where no magnification carries it."""
+        return pull_under(self.parts(profile, at, modulus), at.load, self.cohesion, self.tangent)
+
+    def magnification(self, profile: StressProfile, at: SteadyRun, modulus: Real) -> float:
+        """M, the true over the measured stress."""
+        parts = self.parts(profile, at, modulus)
+        return float(magnification(parts, at.load, self.cohesion, self.tangent))
+
+    def on_slopes(self, profile: StressProfile, at: SteadyRun, modulus: Real) -> SlopePull:
+        """The pull by the slope, of a wheel that carries and pulls the weight of the run."""
+        parts = self.parts(profile, at, modulus)
+        return SlopePull.of_wheel(parts, float(at.weight), self.cohesion, self.tangent)
+
+    def modulus(self, profile: StressProfile, at: SteadyRun) -> float:
+        """k_x (m) at which the wheel pulls what the slope requires; see `find_modulus`."""
+        return find_modulus(lambda k: np.asarray(self.pull(profile, at, k)), at.required)
 
 
 def find_modulus(pull: Callable[[Floats], Floats], required: float) -> float:

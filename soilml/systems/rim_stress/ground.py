@@ -23,7 +23,6 @@ from soilml.systems.rim_stress.climbs import (
     ShearParameters,
     Uncertainty,
     count_apart,
-    wheel_components,
 )
 from soilml.systems.rim_stress.force_balance import magnification, unit_remarks
 
@@ -120,21 +119,16 @@ def identify_ground(
     ranges = {name: prior.get(name, DEFAULT_PRIORS[name]) for name in SHEAR if name not in fixed}
     tolerance = max(SLOPE_SIGMAS * np.sqrt(2.0) * noise.slope_rad, MIN_SLOPE_DIFFERENCE)
     slopes = count_apart([climb.slope for climb in climbs], float(tolerance))
-    _refuse_too_few(slopes, list(ranges))
+    free, width = list(ranges), max(len(ranges), 1)
+    _refuse_too_few(slopes, free)
     constant = fixed.get("shear_modulus", 0.0)
     within = ranges.get("shear_modulus") or Prior(constant, constant)
-    balances = ForceBalances.tabulate(rover, climbs, within)
-    rng, free = np.random.default_rng(seed), list(ranges)
+    balances, rng = ForceBalances.tabulate(rover, climbs, within), np.random.default_rng(seed)
 
     def soils(u: Floats) -> Floats:
         """(c, phi, k_x) (n, 3) at fractions (n, p) of the priors."""
-        columns = [
-            ranges[name].at(u[:, free.index(name)])
-            if name in ranges
-            else fixed[name] + 0.0 * u[:, 0]
-            for name in SHEAR
-        ]
-        return np.stack(columns, axis=1)
+        drawn = {name: ranges[name].at(u[:, i]) for i, name in enumerate(free)}
+        return np.stack([drawn.get(n, np.full(len(u), fixed.get(n, 0.0))) for n in SHEAR], axis=1)
 
     def draw(whitener: Floats) -> Floats:
         """Posterior samples (n, p) of the fractions, for Gaussian residuals whitened as given."""
@@ -149,7 +143,6 @@ def identify_ground(
         return drawn.u[rng.choice(len(drawn.u), SAMPLES, p=drawn.weights)]
 
     # the covariance depends on the soil: evaluated at the best of many, then at the mean
-    width = max(len(free), 1)
     corners = np.asarray(list(product((EDGE, 1.0 - EDGE), repeat=width)))
     start = soils(np.vstack([rng.random((START_SOILS, width)), corners]))
     missed = balances.residuals(start)
@@ -159,22 +152,23 @@ def identify_ground(
         squares = ((missed @ whitener.T) ** 2).sum(axis=1)
         centre = start[int(np.argmin(np.nan_to_num(squares, nan=np.inf)))]
     _refuse_unexplained(balances, missed, std)
-    freedom, noise_scale = len(climbs) - len(free), 1.0
+    freedom, noise_scale = max(len(climbs) - len(free), 1), 1.0
     for _ in range(ITERATIONS):
         u = draw(whitener / noise_scale)
         centre = soils(u).mean(axis=0)
         whitener, std = balances.whitener(_shear(centre), noise)
         residual = balances.residuals(centre[None])[0]
-        misfit = float(np.sum((whitener @ residual) ** 2)) / max(freedom, 1)
-        noise_scale = float(np.sqrt(misfit)) if misfit > misfit_limit(max(freedom, 1)) else 1.0
+        misfit = float(np.sum((whitener @ residual) ** 2)) / freedom
+        noise_scale = float(np.sqrt(misfit)) if misfit > misfit_limit(freedom) else 1.0
     _refuse_contradiction(balances, residual, std, noise_scale)
     as_measured, _ = balances.whitener(_shear(centre), replace(noise, entry_angle_rad=0.0))
     samples = soils(u)
+    values = samples[:, [SHEAR.index(name) for name in free]]
     fit = Fit(
         method="climbing",
         names=tuple(free),
         units=tuple(QUANTITIES[name].unit for name in free),
-        values=(values := samples[:, [SHEAR.index(name) for name in free]]).mean(axis=0),
+        values=values.mean(axis=0),
         covariance=np.atleast_2d(np.cov(values, rowvar=False)) if free else np.zeros((0, 0)),
         warnings=(),
         rows_used=len(climbs),
@@ -182,11 +176,13 @@ def identify_ground(
         misfit=misfit,
         channels=("slope_rad",),
     )
-    cohesion, friction, modulus = _shear(samples.mean(axis=0))
+    cohesion, friction, modulus = _shear(centre)
     scales = [
-        magnification(wheel_components(wheel, rover, modulus), load, cohesion, np.tan(friction))
+        magnification(parts, load, cohesion, np.tan(friction))
         for climb in climbs
-        for wheel, load in zip(climb.wheels, rover.loads(climb.slope), strict=True)
+        for parts, load in zip(
+            rover.parts(climb.wheels, modulus), rover.loads(climb.slope), strict=True
+        )
     ]
     assumed = {name: ranges[name] for name in free if name not in prior}
     warnings = _warnings(fit, noise_scale, slopes, assumed) + unit_remarks(np.asarray(scales))

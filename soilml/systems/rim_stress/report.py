@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.numerics.quantiles import QuantileBand, quantile_band
+from soilml.numerics.quantiles import band_columns, quantile_band
 from soilml.quantities import SHEAR
 from soilml.remarks import Remark, about
 from soilml.report.column_figure import column_picture
-from soilml.report.numbers import format_band
 from soilml.report.report import Report
 from soilml.report.tables import Column, ReportTable
 from soilml.systems.rim_stress.ability import (
@@ -30,6 +29,7 @@ from soilml.systems.rim_stress.tables import ClimbData
 MAX_STILL_RISING = 0.05
 ZERO_SLIP_SIGMAS = 2.0  # Slips within this many standard deviations of zero have no certain sign
 SLIPS = 9  # Slips of the curve in its table
+ENDS = ("exit", "entry", "centre")  # Angles that are compared
 
 
 @dataclass(frozen=True)
@@ -37,24 +37,21 @@ class ClimbingReport:
     """Soil, climbing ability, the shear modulus of each climb alone, and whether stresses agree.
 
     modulus: k_x of each climb alone, m (climbs,).
-    stress: By wheel, the arc on slopes less that at artificial slip; None where not measured.
+    stress: By wheel, the arc on slopes less that at artificial slip; only where measured.
     """
 
     ground: GroundEstimate
     ability: ClimbingAbility
     data: ClimbData
     modulus: Floats
-    stress: dict[str, StressComparison | None]
+    stress: dict[str, StressComparison]
 
     @property
-    def curve(self) -> dict[str, Any]:
+    def curve(self) -> dict[str, Floats]:
         """Pull on level ground and slope over slip, with their bands, by names of columns."""
-        bands = {"drawbar_pull_N": self.ability.pull, "slope_rad": self.ability.slope}
-        found: dict[str, Any] = {"slip": self.ability.slip}
-        for name, draws in bands.items():
-            band = quantile_band(draws)
-            found |= {name: band.middle, f"{name}_p05": band.lower, f"{name}_p95": band.upper}
-        return found
+        pull, slope = self.ability.pull, self.ability.slope
+        bands = band_columns("drawbar_pull_N", pull) | band_columns("slope_rad", slope)
+        return {"slip": self.ability.slip} | bands
 
     @property
     def climbs(self) -> dict[str, Any]:
@@ -68,6 +65,23 @@ class ClimbingReport:
             "off_N": self.ground.residual,
             "off_N_std": self.ground.residual_std,
             "shear_modulus_m": self.modulus,
+        }
+
+    def as_json(self) -> dict[str, Any]:
+        """Soil, steepest slope, curve and climbs, in SI units."""
+        fit, ability = self.ground.fit, self.ability
+        given = zip(SHEAR, self.ground.samples[0].tolist(), strict=True)
+        found = band_columns("steepest_slope_rad", ability.steepest)
+        found |= band_columns("slip_at_steepest", ability.steepest_slip)
+        tables = {"curve": self.curve, "climbs": self.climbs}
+        return {
+            "soil": fit.as_json(),
+            "given": {name: value for name, value in given if name not in fit.names},
+            **{name: float(value) for name, value in found.items()},
+            **{
+                title: {name: np.asarray(values).tolist() for name, values in columns.items()}
+                for title, columns in tables.items()
+            },
         }
 
     @property
@@ -98,7 +112,7 @@ class ClimbingReport:
                 "shear displacement there is not known"
             )
             warnings.append(Remark("zero-slip", text, tuple(zero)))
-        differ = [wheel for wheel, found in self.stress.items() if found and not found.equal]
+        differ = [wheel for wheel, found in self.stress.items() if not found.equal]
         if differ:
             text = (
                 f"stress of the {' and '.join(differ)} wheel on slopes differs from that at "
@@ -107,58 +121,33 @@ class ClimbingReport:
             warnings.append(Remark("stress-differs", text, tuple(differ)))
         return tuple(warnings)
 
-    def as_json(self) -> dict[str, Any]:
-        """The content of the file that `soilml paper climb` writes."""
-        fit, ability, rover = self.ground.fit, self.ability, self.ground.rover
-        columns = {name: np.asarray(values).tolist() for name, values in self.climbs.items()}
-        given = dict(zip(SHEAR, self.ground.samples[0].tolist(), strict=True))
-        return {
-            "ground": fit.as_json()
-            | {"given": {name: value for name, value in given.items() if name not in fit.names}},
-            "front_share": rover.front_share,
-            "height_ratio": rover.height_ratio,
-            "runs": [
-                dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)
-            ],
-            "curve": {
-                "slip": ability.slip.tolist(),
-                "drawbar_pull_N": _listed(quantile_band(ability.pull)),
-                "slope_rad": _listed(quantile_band(ability.slope)),
-            },
-            "steepest_slope_rad": _listed(quantile_band(ability.steepest)),
-            "slip_at_steepest": _listed(quantile_band(ability.steepest_slip)),
-            "warnings": [remark.as_json() for remark in self.warnings],
-        }
-
     def report(self, title: str = "Slopes that a rover climbs") -> Report:
         """The steepest slope, the soil, pull and slope over slip, and the check of the stress."""
-        fit, ability = self.ground.fit, self.ability
-        verdict = f"The rover climbs {_band(quantile_band(ability.steepest), 'rad')}."
-        lines = [f"That is at slip {_band(quantile_band(ability.steepest_slip))}."]
-        checked = {wheel: found for wheel, found in self.stress.items() if found is not None}
-        if checked and all(found.equal for found in checked.values()):
+        fit, best = self.ground.fit, quantile_band(self.ability.steepest)
+        lines = [f"That is at slip {quantile_band(self.ability.steepest_slip).text()}."]
+        if self.stress and all(found.equal for found in self.stress.values()):
             lines.append("Stress on slopes equals stress at artificial slip within its scatter.")
         left = [fit.remaining_fraction.get(name) for name in fit.names]
-        at = np.linspace(0, len(ability.slip) - 1, SLIPS).astype(int)
+        curve, climbs = self.curve, self.climbs
+        at = np.linspace(0, len(curve["slip"]) - 1, SLIPS).astype(int)
         tables = [
-            ReportTable.of("Pull and slope over slip", {k: v[at] for k, v in self.curve.items()}),
-            ReportTable.of("Climbs", self.climbs),
+            ReportTable.of("Pull and slope over slip", {k: v[at] for k, v in curve.items()}),
+            ReportTable.of("Climbs", climbs),
         ]
-        if checked:
-            ends = [f"{wheel} {end}" for wheel in checked for end in ("exit", "entry", "centre")]
-            apart, std = (
-                np.concatenate([getattr(found, name) for found in checked.values()]).tolist()
-                for name in ("difference", "std")
-            )
-            columns = [Column("angle", ends), Column("difference", apart, "rad", std)]
-            tables.append(
-                ReportTable("Stressed arc on slopes less that at artificial slip", columns)
-            )
-        climbs, slopes = fit.rows_used, self.ground.distinct_slopes
+        if self.stress:
+            of_ends = {
+                "angle": [f"{wheel} {end}" for wheel in self.stress for end in ENDS],
+                "difference_rad": np.concatenate([s.difference for s in self.stress.values()]),
+                "difference_rad_std": np.concatenate([s.std for s in self.stress.values()]),
+            }
+            title_of_ends = "Stressed arc on slopes less that at artificial slip"
+            tables.append(ReportTable.of(title_of_ends, of_ends))
+        slip = 0.5 * (np.asarray(climbs["slip_front"]) + climbs["slip_rear"])
+        slopes = self.ground.distinct_slopes
         vague = about(self.warnings, "not-identified")
         return Report(
             kind="climb",
-            verdict=verdict,
+            verdict=f"The rover climbs {best.text('rad')}.",
             lines=lines,
             figures=ReportTable.of_parameters(
                 "Soil",
@@ -168,16 +157,13 @@ class ClimbingReport:
             tables=tables,
             pictures=[
                 column_picture(
-                    self.curve,
+                    curve,
                     "slip",
                     [("drawbar_pull_N",), ("slope_rad",)],
                     title="Pull and slope over slip",
                     caption="Lines: medians, with bands of 90 %. Dots: the climbs, at the mean "
                     "slip of both wheels.",
-                    measured={
-                        "slip": [0.5 * (c.front.slip + c.rear.slip) for c in self.data.climbs],
-                        "slope_rad": [c.slope for c in self.data.climbs],
-                    },
+                    measured={"slip": slip, "slope_rad": climbs["slope_rad"]},
                 )
             ],
             remarks=self.warnings,
@@ -185,18 +171,10 @@ class ClimbingReport:
             status="partly known" if vague else "predicted",
             tone="warn" if vague else "good",
             title=title,
-            basis=f"{climbs} climb{'s'[: climbs != 1]} on {slopes} slope{'s'[: slopes != 1]}",
+            basis=f"{fit.rows_used} climb{'s'[: fit.rows_used != 1]} on {slopes} "
+            f"slope{'s'[: slopes != 1]}",
             notation=[("90 %", "from the 5 % to the 95 % quantile; medians before them.")],
         )
-
-
-def _band(found: QuantileBand, unit: str = "1") -> str:
-    return format_band(float(found.lower), float(found.middle), float(found.upper), unit)
-
-
-def _listed(band: QuantileBand) -> dict[str, Any]:
-    named = (("median", band.middle), ("p05", band.lower), ("p95", band.upper))
-    return {name: np.asarray(values).tolist() for name, values in named}
 
 
 def climbing_report(file: RoverFile, data: ClimbData, *, seed: int = 0) -> ClimbingReport:
@@ -206,15 +184,16 @@ def climbing_report(file: RoverFile, data: ClimbData, *, seed: int = 0) -> Climb
         file.rover, data.climbs, fixed=file.fixed, prior=file.prior, noise=file.noise, seed=seed
     )
     cohesion, friction, _ = ground.shear
+    compared = {
+        wheel: compare_stress(
+            [climb.wheels[i] for climb in data.climbs], data.of_wheel(wheel, climbs=False)
+        )
+        for i, wheel in enumerate(WHEELS)
+    }
     return ClimbingReport(
         ground,
         climbing_ability(ground, front, rear, seed=seed),
         data,
         modulus_per_climb(file.rover, data.climbs, cohesion=cohesion, friction_angle=friction),
-        stress={
-            wheel: compare_stress(
-                [climb.wheels[i] for climb in data.climbs], data.of_wheel(wheel, climbs=False)
-            )
-            for i, wheel in enumerate(WHEELS)
-        },
+        {wheel: found for wheel, found in compared.items() if found is not None},
     )

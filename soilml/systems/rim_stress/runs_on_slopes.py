@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from soilml.arrays import Floats, Real
+from soilml.arrays import Floats
 from soilml.errors import FitError, InputError
 from soilml.physics.model import Model
 from soilml.physics.operating_point import MOST_SLIP, Operating
@@ -20,16 +19,7 @@ from soilml.report.column_figure import column_picture
 from soilml.report.numbers import format_quantity
 from soilml.report.report import Report
 from soilml.report.tables import ReportTable
-from soilml.systems.rim_stress.force_balance import (
-    MohrCoulomb,
-    SlopePull,
-    SteadyRun,
-    find_modulus,
-    force_components,
-    magnification,
-    pull_under,
-    unit_remarks,
-)
+from soilml.systems.rim_stress.force_balance import SteadyRun, WheelBalance, unit_remarks
 from soilml.systems.rim_stress.stress import (
     MeasuredStress,
     SensingWheel,
@@ -46,6 +36,7 @@ SHAPE_STD = 0.015
 MAX_VALID_SLIP, MAX_SATURATED = 0.5, 0.01
 
 
+ENDS = ((5, -Z_90), (95, Z_90))  # Per cent below the ends of 90 % intervals, and their deviations
 #: Columns of each panel of the picture; the last is fig. 7 of the source.
 PANELS = (
     ("shear_modulus_m",),
@@ -56,102 +47,65 @@ PANELS = (
 
 @dataclass(frozen=True)
 class RunsOnSlopes:
-    """What the force balance of each run gives, arrays (runs,); NaN where it has no solution.
+    """What the force balance of each run gives.
 
-    shear_modulus: k_x, m. magnification: True over measured stress, M.
-    drawbar_pull: Predicted by the k_x of the reference run, N.
-    climbed: Slope that the wheel climbs at this slip by that k_x, rad.
-    conventional: Drawbar pull of the model on its own stress, Bekker's, N; None without a model.
-    Standard deviations `_std` have the errors of the stress and the declared ones of slip, weight
-    and slope, of both runs.
+    columns: A row for each run by names of columns: its k_x, m, and M, the true over the measured
+        stress; pull and slope climbed by the k_x of the reference run, beside those that the slope
+        requires and, with a model, those by its own stress, Bekker's. NaN where there is none.
+        Standard deviations `_std` have the errors of the stress and the declared ones of slip,
+        weight and slope, of both runs.
+    reference: The run whose k_x predicts.
     """
 
-    at: Mapping[str, SteadyRun]
-    shear_modulus: Floats
-    shear_modulus_std: Floats
-    magnification: Floats
-    drawbar_pull: Floats
-    drawbar_pull_std: Floats
-    climbed: Floats
-    climbed_std: Floats
-    conventional: Floats | None
+    columns: dict[str, Any]
     reference: str
     warnings: tuple[Remark, ...]
 
-    @property
-    def columns(self) -> dict[str, Any]:
-        """A row for each run, by names of columns."""
-        pull, std = self.drawbar_pull, self.drawbar_pull_std
-        runs = self.at.values()
-        weight, slope, slip = (
-            np.asarray([float(getattr(at, name)) for at in runs])
-            for name in ("weight", "slope", "slip")
-        )
-        found = {
-            "run": list(self.at),
-            "slip": slip,
-            "shear_modulus_m": self.shear_modulus,
-            "shear_modulus_m_std": self.shear_modulus_std,
-            "drawbar_pull_N": pull,
-            "drawbar_pull_N_std": std,
-            "pull_on_slope_N": weight * np.sin(slope),
-            "slope_climbed_rad": self.climbed,
-            "slope_climbed_rad_std": self.climbed_std,
-            "slope_rad": slope,
-        }
-        if self.conventional is not None:
-            angle = np.arctan2(self.conventional, weight * np.cos(slope))
-            found |= {"pull_by_bekker_N": self.conventional, "slope_by_bekker_rad": angle}
-        found["magnification"] = self.magnification
-        found["drawbar_pull_N_p05"] = pull - Z_90 * std
-        found["drawbar_pull_N_p95"] = pull + Z_90 * std
-        return found
-
     def report(self, title: str = "Pull of a wheel from the stress on its rim") -> Report:
         """How well one k_x predicts the pulls that the slopes require, then a row for each run."""
-        columns = self.columns
-        needed, pull = columns["pull_on_slope_N"], self.drawbar_pull
-        others = np.asarray([name != self.reference for name in self.at])
-        within = np.abs(pull - needed) < Z_90 * self.drawbar_pull_std
-        verdict = f"The k_x of run {self.reference} is {self._modulus}"
+        columns, k = self.columns, self.columns["run"].index(self.reference)
+        others = np.asarray(columns["run"]) != self.reference
+        off = columns["drawbar_pull_N"] - columns["pull_on_slope_N"]
+        within = np.abs(off) < Z_90 * columns["drawbar_pull_N_std"]
+        modulus, std = columns["shear_modulus_m"][k], columns["shear_modulus_m_std"][k]
+        verdict = f"The k_x of run {self.reference} is {format_quantity(modulus, 'm', std)}"
+        lines = []
         if others.any():
             verdict += (
                 f"; the pull that the slope requires is in the 90 % interval of "
                 f"{int((within & others).sum())} of {int(others.sum())} other runs"
             )
-        lines = []
-        if self.conventional is not None and others.any():
-            off, own = (
-                format_quantity(float(np.sqrt(np.nanmean((v - needed)[others] ** 2))), "N")
-                for v in (pull, self.conventional)
+        if "pull_by_bekker_N" in columns and others.any():
+            own = columns["pull_by_bekker_N"] - columns["pull_on_slope_N"]
+            by_stress, by_bekker = (
+                format_quantity(float(np.sqrt(np.nanmean(each[others] ** 2))), "N")
+                for each in (off, own)
             )
-            lines = [f"The pull of the others is off by {off}, that of Bekker's stress by {own}."]
+            lines = [
+                f"The pull of the others is off by {by_stress}, that of Bekker's stress by "
+                f"{by_bekker}."
+            ]
+        panels = [tuple(name for name in panel if name in columns) for panel in PANELS]
         return Report(
             kind="sensor-wheel",
             verdict=f"{verdict}.",
             lines=lines,
             tables=[ReportTable.of("Runs", columns)],
-            pictures=[column_picture(columns, "slip", PANELS, title="k_x, pull, slope")],
+            pictures=[column_picture(columns, "slip", panels, title="k_x, pull, slope")],
             remarks=self.warnings,
             title=title,
         )
-
-    @property
-    def _modulus(self) -> str:
-        k = list(self.at).index(self.reference)
-        value, std = float(self.shear_modulus[k]), float(self.shear_modulus_std[k])
-        return format_quantity(value, "m", std)
 
 
 def solve_runs(
     runs: Mapping[str, SteadyRun],
     stresses: Mapping[str, MeasuredStress],
     wheel: SensingWheel,
-    strength: MohrCoulomb,
+    soil: Soil,
     reference: str | None = None,
     *,
     discs: bool = False,
-    model: tuple[Model, Soil] | None = None,
+    model: Model | None = None,
 ) -> RunsOnSlopes:
     """Solve the balance of each run for k_x, and predict pull and slope with that of one run.
 
@@ -165,14 +119,14 @@ def solve_runs(
         Slip, weight and slope of each run.
     stresses
         Measured stress on the rim, by run.
-    wheel, strength
+    wheel, soil
         Radius, width and sensors of the wheel; cohesion and friction angle of the soil.
     reference
         The run whose k_x predicts; by default the one of the least slope.
     discs
         Whether the averaging over round sensors is removed.
     model
-        Wheel and soil whose own stress gives the conventional pull beside.
+        Wheel whose own stress on the soil gives the conventional pull beside.
 
     Raises
     ------
@@ -193,32 +147,20 @@ def solve_runs(
         reference = min(runs, key=lambda name: abs(float(runs[name].slope)))
     if reference not in runs:
         raise InputError(f"no run {reference!r}; there are: {', '.join(runs)}")
-    rng, why = np.random.default_rng(0), dict[str, str]()
-    cohesion, tangent = float(strength.cohesion), math.tan(float(strength.friction_angle))
+    balance, rng, why = WheelBalance.of(wheel, soil), np.random.default_rng(0), dict[str, str]()
     shape = _normal(rng, 1)[:, 0] * (SHAPE_STD if discs else 0.0)
-
-    def parts(profile: StressProfile, at: SteadyRun, modulus: Real) -> Floats:
-        size = float(wheel.radius), float(wheel.width)
-        return force_components(profile, float(at.slip), modulus, *size)
-
-    def load(at: SteadyRun) -> float:
-        return float(at.weight) * math.cos(float(at.slope))
-
-    def balance(profile: StressProfile, at: SteadyRun) -> float:
-        def pull(modulus: Floats) -> Floats:
-            return np.asarray(pull_under(parts(profile, at, modulus), load(at), cohesion, tangent))
-
-        return find_modulus(pull, float(at.weight) * math.sin(float(at.slope)))
-
-    drawn = {
-        name: _drawn(at, profiles(stresses[name], wheel if discs else None, rng), rng)
+    drawn = [
+        _drawn(at, profiles(stresses[name], wheel if discs else None, rng), rng)
         for name, at in runs.items()
-    }
-    solved = np.full((len(runs), DRAWS + 1), np.nan)  # the first draw is what was measured
+    ]
+    # by run and draw, of which the first is what was measured: k_x; pull and slope by that of the
+    # reference
+    solved = np.full((len(runs), DRAWS + 1), np.nan)
+    predicted = np.full((len(runs), DRAWS + 1, 2), np.nan)
     for k, name in enumerate(runs):
-        for i, (profile, at) in enumerate(drawn[name]):
+        for i, own in enumerate(drawn[k]):
             try:
-                solved[k, i] = balance(profile, at)
+                solved[k, i] = balance.modulus(*own)
             except FitError as error:
                 if i == 0:
                     why[name] = str(error)
@@ -227,36 +169,36 @@ def solve_runs(
         raise FitError(f"run {reference}, the reference: {why[reference]}")
     solved[:, 1:] *= np.exp(shape)
     known = solved[list(runs).index(reference)]
-    # (runs, draws, 2): pull and slope by the k_x of the reference
-    predicted = np.full((len(runs), DRAWS + 1, 2), np.nan)
-    scale = np.full(len(runs), np.nan)
-    for k, name in enumerate(runs):
-        for i, (profile, at) in enumerate(drawn[name]):
-            each = parts(profile, at, known[i])
-            steep = SlopePull.of_wheel(each, float(at.weight), cohesion, tangent)
-            predicted[k, i] = steep.pull(float(at.slope)), steep.equilibrium_slope()
-        profile, at = drawn[name][0]
-        if name not in why:
-            scale[k] = magnification(parts(profile, at, solved[k, 0]), load(at), cohesion, tangent)
-    own = None
+    for k, each in enumerate(drawn):
+        for i, own in enumerate(each):
+            pull = balance.on_slopes(*own, known[i])
+            predicted[k, i] = pull.pull(float(own[1].slope)), pull.equilibrium_slope()
+    modulus, (pulls, slopes) = solved[:, 0], np.moveaxis(predicted[:, 0], 1, 0)
+    pull_std = _std(predicted[:, 1:, 0])
+    slip = np.asarray([float(at.slip) for at in runs.values()])
+    load = np.asarray([at.load for at in runs.values()])
+    columns: dict[str, Any] = {
+        "run": list(runs),
+        "slip": slip,
+        "shear_modulus_m": modulus,
+        "shear_modulus_m_std": modulus * _std(np.log(solved[:, 1:])),
+        "drawbar_pull_N": pulls,
+        "drawbar_pull_N_std": pull_std,
+        "pull_on_slope_N": np.asarray([at.required for at in runs.values()]),
+        "slope_climbed_rad": slopes,
+        "slope_climbed_rad_std": _std(predicted[:, 1:, 1]),
+        "slope_rad": np.asarray([float(at.slope) for at in runs.values()]),
+    }
     if model is not None:
-        slip = np.asarray([float(at.slip) for at in runs.values()])
-        under = Operating(slip=slip, load=np.asarray([load(at) for at in runs.values()]))
-        own = np.asarray(model[0](model[1], under).drawbar_pull)
-    modulus = solved[:, 0]
-    return RunsOnSlopes(
-        at=runs,
-        shear_modulus=modulus,
-        shear_modulus_std=modulus * _std(np.log(solved[:, 1:])),
-        magnification=scale,
-        drawbar_pull=predicted[:, 0, 0],
-        drawbar_pull_std=_std(predicted[:, 1:, 0]),
-        climbed=predicted[:, 0, 1],
-        climbed_std=_std(predicted[:, 1:, 1]),
-        conventional=own,
-        reference=reference,
-        warnings=_warnings(runs, stresses, scale, why, discs),
+        by_bekker = np.asarray(model(soil, Operating(slip=slip, load=load)).drawbar_pull)
+        columns |= {"pull_by_bekker_N": by_bekker}
+        columns |= {"slope_by_bekker_rad": np.arctan2(by_bekker, load)}
+    columns["magnification"] = np.asarray(
+        [balance.magnification(*each[0], k) for each, k in zip(drawn, modulus, strict=True)]
     )
+    columns |= {f"drawbar_pull_N_p{at:02d}": pulls + z * pull_std for at, z in ENDS}
+    warnings = _warnings(runs, stresses, columns["magnification"], why, discs)
+    return RunsOnSlopes(columns, reference, warnings)
 
 
 def profiles(

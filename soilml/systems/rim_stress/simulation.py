@@ -11,6 +11,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import FitError, InputError
+from soilml.physics.soils import Soil
 from soilml.systems.rim_stress.ability import pull_and_slope_at
 from soilml.systems.rim_stress.climbs import (
     WHEELS,
@@ -19,16 +20,9 @@ from soilml.systems.rim_stress.climbs import (
     ShearParameters,
     Uncertainty,
     WheelRun,
-    wheel_components,
 )
-from soilml.systems.rim_stress.force_balance import (
-    MohrCoulomb,
-    SteadyRun,
-    force_components,
-    magnification,
-    pull_under,
-)
-from soilml.systems.rim_stress.stress import SensingWheel, SensorReadings, StressProfile
+from soilml.systems.rim_stress.force_balance import SteadyRun, WheelBalance, magnification
+from soilml.systems.rim_stress.stress import SensingWheel, StressProfile
 
 #: Slopes of the test field and artificial slips on the flat, as in Nagatani et al., sections 3, 5.
 SLOPES = tuple(np.deg2rad([0.0, 4.0, 8.0, 10.0, 12.0]).tolist())
@@ -47,8 +41,10 @@ def simulate_readings(
     crown: float = 0.0,
     lugs: tuple[float, float] = (0.0, 0.0),
     seed: int = 0,
-) -> SensorReadings:
+) -> dict[str, Floats]:
     r"""Simulate the readings of a true stress profile, each turn at a random phase.
+
+    Returns the columns that `bin_stress` takes.
 
     A sensor averages the stress over its disc, less the part carried by the lugs; noise, deadband
     and saturation follow. At y half widths from the middle of the rim the stress is
@@ -74,7 +70,8 @@ def simulate_readings(
     force = np.where(force < wheel.deadband, 0.0, np.minimum(force, wheel.saturation))
     number = np.broadcast_to(np.arange(1.0, wheel.sensors + 1.0), force.shape)
     wide = np.broadcast_to(angle[..., None], force.shape)
-    return SensorReadings(wide.ravel(), number.ravel(), force.ravel())
+    columns = {"angle_rad": wide, "sensor": number, "force_N": force}
+    return {name: values.ravel() for name, values in columns.items()}
 
 
 @dataclass(frozen=True)
@@ -190,7 +187,7 @@ class SimulatedRover:
         """Slip and stress as wheel i of `WHEELS` measures them: the true stress over M, noise."""
         cohesion, friction, modulus = self.shear
         true = WheelRun(slip, self.arcs[i].stress(slip))
-        parts = wheel_components(true, self.rover, modulus)
+        (parts,) = self.rover.parts([true], modulus)
         scale = magnification(parts, self.rover.loads(slope)[i], cohesion, np.tan(friction))
         # front and rear differ by front_load, so that each deviates by front_load / sqrt(2)
         deviation = self.noise.front_load * rng.normal() / np.sqrt(2.0)
@@ -210,27 +207,30 @@ def climb_tables(
     *,
     rim_speed: float,
 ) -> tuple[Columns, Columns]:
-    """Tables (climbs, stresses) of columns as they are read, with speeds by that of the rim (m/s).
+    """Tables (runs, stresses) of columns as they are read, with speeds by that of the rim (m/s).
 
-    `front` and `rear` are stresses at artificial slip, which become separate runs.
+    `front` and `rear` are stresses at artificial slip, which become runs without a slope.
     """
-    climbed = [(c, w, run) for c in climbs for w, run in zip(WHEELS, c.wheels, strict=True)]
-    runs: Columns = {
-        "run": [c.name for c, _, _ in climbed],
-        "wheel": [wheel for _, wheel, _ in climbed],
-        "slope_rad": [c.slope for c, _, _ in climbed],
-        "speed_m_s": [rim_speed * (1.0 - run.slip) for _, _, run in climbed],
-        "rim_speed_m_s": [rim_speed for _ in climbed],
-    }
-    stressed = [(c.name, wheel, run) for c, wheel, run in climbed]
+    each = [
+        (climb.name, wheel, climb.slope, run)
+        for climb in climbs
+        for wheel, run in zip(WHEELS, climb.wheels, strict=True)
+    ]
     for wheel, artificial in zip(WHEELS, (front, rear), strict=True):
-        stressed += [(f"flat_{wheel}_{i}", wheel, run) for i, run in enumerate(artificial, 1)]
+        each += [(f"flat_{wheel}_{i}", wheel, np.nan, r) for i, r in enumerate(artificial, 1)]
+    runs: Columns = {
+        "run": [name for name, _, _, _ in each],
+        "wheel": [wheel for _, wheel, _, _ in each],
+        "slope_rad": [slope for _, _, slope, _ in each],
+        "speed_m_s": [rim_speed * (1.0 - run.slip) for _, _, _, run in each],
+        "rim_speed_m_s": [rim_speed for _ in each],
+    }
     samples = [
-        (name, wheel, run.slip, float(angle), float(normal))
-        for name, wheel, run in stressed
+        (name, wheel, float(angle), float(normal))
+        for name, wheel, _, run in each
         for angle, normal in zip(run.profile.angle, run.profile.normal, strict=True)
     ]
-    names = ("run", "wheel", "slip", "angle_rad", "normal_Pa")
+    names = ("run", "wheel", "angle_rad", "normal_Pa")
     return runs, {n: list(own) for n, own in zip(names, zip(*samples, strict=True), strict=True)}
 
 
@@ -252,38 +252,30 @@ def parabolic_arc(
 
 
 def balanced_arc(
-    length: float,
-    at: SteadyRun,
-    wheel: SensingWheel,
-    strength: MohrCoulomb,
-    shear_modulus: float,
-    lean: float = 0.0,
+    length: float, at: SteadyRun, wheel: SensingWheel, soil: Soil, lean: float = 0.0
 ) -> StressProfile:
     """The arc of this length (rad) that satisfies both force balances of the run.
 
     The further forward an arc is, the smaller its pull: its middle is found by bisection over all
     positions below the axle, its magnitude from the load. Nagatani et al. 2009 print k_x and the
-    length of the arc but not its position; this is the position consistent with both. Raises
-    `FitError` if there is none.
+    length of the arc but not its position; this is the position consistent with both, at the shear
+    modulus of the soil. Raises `FitError` if there is none.
     """
-    weight, slope = float(at.weight), float(at.slope)
-    load, required = weight * np.cos(slope), weight * np.sin(slope)
-    soil = float(strength.cohesion), float(np.tan(strength.friction_angle))
-    rim = float(at.slip), shear_modulus, float(wheel.radius), float(wheel.width)
+    balance, modulus = WheelBalance.of(wheel, soil), float(soil.shear_modulus)
 
     def too_far_back(middle: float) -> bool:
-        parts = force_components(parabolic_arc(middle, length, 1.0, lean), *rim)
+        arc = parabolic_arc(middle, length, 1.0, lean)
         # NaN where its shear pulls the wheel down
-        return not float(pull_under(parts, load, *soil)) <= required
+        return not float(balance.pull(arc, at, modulus)) <= at.required
 
     rear, front = -0.45 * np.pi + 0.5 * length, 0.45 * np.pi - 0.5 * length
     if not rear < front or not too_far_back(rear) or too_far_back(front):
         raise FitError(
-            f"no position of an arc of {length:g} rad lets the wheel pull {required:.3g} N at slip "
-            f"{float(at.slip):g}"
+            f"no position of an arc of {length:g} rad lets the wheel pull {at.required:.3g} N at "
+            f"slip {float(at.slip):g}"
         )
     for _ in range(HALVINGS):
         middle = 0.5 * (rear + front)
         rear, front = (middle, front) if too_far_back(middle) else (rear, middle)
-    parts = force_components(parabolic_arc(front, length, 1.0, lean), *rim)
-    return parabolic_arc(front, length, float(magnification(parts, load, *soil)), lean)
+    arc = parabolic_arc(front, length, 1.0, lean)
+    return parabolic_arc(front, length, balance.magnification(arc, at, modulus), lean)

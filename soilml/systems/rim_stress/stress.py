@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, final
@@ -166,31 +167,6 @@ class SensingWheel:
         return 0.5 * self.diameter / self.radius * np.cos(turn), share / share.sum()
 
 
-@final
-@dataclass(frozen=True)
-class SensorReadings:
-    """Samples of the sensors over one or more turns, in any order, (n,) each.
-
-    angle: From straight down, positive forward, rad. sensor: Number in the row, from 1. force: N.
-    Raises `InputError` for other shapes, values that are not finite, and angles in degrees.
-    """
-
-    angle: Floats
-    sensor: Floats
-    force: Floats
-
-    def __post_init__(self) -> None:
-        for name in ("angle", "sensor", "force"):
-            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
-        shapes = {self.angle.shape, self.sensor.shape, self.force.shape}
-        if len(shapes) > 1 or self.angle.ndim != 1 or len(self.angle) == 0:
-            raise InputError(
-                f"readings have angles, sensors and forces of shapes {self.angle.shape}, "
-                f"{self.sensor.shape} and {self.force.shape}; needed is one row of samples each"
-            )
-        _check_angles(self.angle, self.force, "a row of readings")
-
-
 @dataclass(frozen=True)
 class MeasuredStress:
     """Mean stress over the sensing area (Pa) against the angle on the rim (rad), (points,) each.
@@ -207,14 +183,19 @@ class MeasuredStress:
     saturated: float = 0.0
 
 
-def bin_stress(readings: SensorReadings, wheel: SensingWheel) -> MeasuredStress:
+def bin_stress(readings: Mapping[str, Floats], wheel: SensingWheel) -> MeasuredStress:
     """Average readings over turns and sensors, in bins as wide as one sampling interval turns.
 
-    Raises `InputError` if no sample exceeds the deadband, or the number of sensors differs from the
-    wheel's. References: Nagatani et al. 2009, section IV.
+    readings: Samples over one or more turns, in any order, (n,) each: `angle_rad` from straight
+        down, positive forward, `sensor`, its number in the row from 1, and `force_N`.
+
+    Raises `InputError` for values that are not finite, for angles in degrees, if no sample exceeds
+    the deadband, or the number of sensors differs from the wheel's. References: Nagatani et al.
+    2009, section IV.
     """
-    force, sensor = readings.force, readings.sensor.astype(int)
-    count = int(wheel.sensors)
+    angle, force = (np.asarray(readings[name], np.float64) for name in ("angle_rad", "force_N"))
+    sensor, count = np.asarray(readings["sensor"]).astype(int), int(wheel.sensors)
+    _check_angles(angle, force, "a row of readings")
     if set(np.unique(sensor)) != set(range(1, count + 1)):
         raise InputError(
             f"readings of sensors {', '.join(map(str, np.unique(sensor)[:9]))}; the wheel has "
@@ -226,7 +207,7 @@ def bin_stress(readings: SensorReadings, wheel: SensingWheel) -> MeasuredStress:
             f"readings without contact: every sample lies in the deadband of {wheel.deadband:g} N"
         )
     bins = math.ceil(2.0 * math.pi / wheel.step)
-    angle_bin = np.minimum((readings.angle + math.pi) // wheel.step, bins - 1).astype(int)
+    angle_bin = np.minimum((angle + math.pi) // wheel.step, bins - 1).astype(int)
     index = angle_bin * count + sensor - 1
     samples = np.bincount(index, minlength=bins * count).reshape(bins, count)
     occupied = (samples > 0).all(axis=1)
@@ -242,7 +223,7 @@ def bin_stress(readings: SensorReadings, wheel: SensingWheel) -> MeasuredStress:
     variance = np.maximum(mean(stress**2) - normal**2, 0.0) / np.maximum(samples - 1, 1)
     in_range = contact & (force < wheel.saturation)
     return MeasuredStress(
-        angle=mean(readings.angle).mean(axis=1),
+        angle=mean(angle).mean(axis=1),
         normal=normal.mean(axis=1),
         std=np.sqrt(variance.sum(axis=1)) / count,
         in_range=(mean(in_range.astype(np.float64)) == 1.0).all(axis=1),

@@ -18,7 +18,6 @@ from soilml.systems.rim_stress.force_balance import SteadyRun
 from soilml.systems.rim_stress.stress import (
     MeasuredStress,
     SensingWheel,
-    SensorReadings,
     StressProfile,
     bin_stress,
 )
@@ -96,8 +95,7 @@ def read_readings(path: str, wheel: SensingWheel) -> dict[str, MeasuredStress]:
     table, found = read_table(path, READINGS, filled=READINGS), {}
     for name, rows in table.groups():
         try:
-            samples = SensorReadings(rows["angle_rad"], rows["sensor"], rows["force_N"])
-            found[name] = bin_stress(samples, wheel)
+            found[name] = bin_stress(rows.columns, wheel)
         except InputError as error:
             raise TableError(f"{path}, run {name}: {error}") from None
     return found
@@ -127,17 +125,18 @@ def _stress(
 def read_climb_data(
     runs: str, stress_path: str, noise: Noise, *, ignore_extra: bool = False
 ) -> ClimbData:
-    """Read a table of climbs and one of stresses; raises `TableError` naming file and row.
+    """Read a table of runs and one of stresses; raises `TableError` naming file and row.
 
-    A climb has one row for its front and one for its rear wheel, and stresses of both. Stresses of
-    other runs, such as artificial slip on level ground, need a slip of their own. `noise` is that
+    A climb has one row for its front and one for its rear wheel, and stresses of both. A run
+    without a slope, such as artificial slip on level ground, may have one of them. `noise` is that
     of the stress where the table has no normal_Pa_std.
     """
     need = ("run", "wheel", "slope_rad")
-    climbed = read_table(runs, need, filled=(*need, "slip", *SPEEDS), ignore_extra=ignore_extra)
+    filled = ("run", "wheel", "slip", *SPEEDS)
+    driven = read_table(runs, need, filled=filled, ignore_extra=ignore_extra)
     own = ("wheel", *STRESS)
     stresses = read_table(stress_path, own, filled=own, ignore_extra=ignore_extra)
-    for table, known in ((climbed, ()), (stresses, ("normal_Pa_std",))):
+    for table, known in ((driven, ()), (stresses, ("normal_Pa_std",))):
         for name in table.columns:
             if name.endswith("_std") and name not in known:
                 raise TableError(f"{table.source}: column {name} is not read; set it in [noise]")
@@ -148,21 +147,23 @@ def read_climb_data(
                 f"{table.place(row)}, column wheel: {str(table['wheel'][row])!r} given; needed is "
                 "front or rear"
             )
-    slips, found = _slips(climbed), dict[Key, WheelRun]()
+    slips, found = _slips(driven), dict[Key, WheelRun]()
     for name, rows in stresses.groups():
         for wheel in dict.fromkeys(rows["wheel"].tolist()):
-            part = rows.rows(rows["wheel"] == wheel)
             where = f", run {name}, {wheel}"
-            stress = _stress(part, noise.std, where)
-            slip = slips.get((name, wheel))
-            if slip is None:
-                slip = _one_slip(part, f"{stresses.source}{where}", runs)
+            if (name, wheel) not in slips:
+                raise TableError(
+                    f"{stresses.source}{where}: no slip; needed is a row of this wheel in {runs}"
+                )
+            stress = _stress(rows.rows(rows["wheel"] == wheel), noise.std, where)
             profile = StressProfile(stress.angle, stress.normal)
-            found[name, wheel] = WheelRun(slip, profile, stress.std)
+            found[name, wheel] = WheelRun(slips[name, wheel], profile, stress.std)
     climbs = []
-    for name, rows in climbed.groups():
+    for name, rows in driven.groups():
         slope = rows["slope_rad"]
-        if np.ptp(slope) > 0.0:
+        if np.isnan(slope).all():
+            continue
+        if not np.ptp(slope) == 0.0:
             raise TableError(
                 f"{rows.place(1)}, column slope_rad: run {name} has slopes of {slope[0]:g} and "
                 f"{slope[1]:g} rad; needed is one slope per run"
@@ -171,49 +172,37 @@ def read_climb_data(
             where, what = rows.place(0), f"run {name} has no row for its {wheel} wheel"
             if wheel in rows["wheel"]:
                 where, what = stresses.source, f"no stress of the {wheel} wheel in climb {name}"
-            if (name, wheel) not in found or wheel not in rows["wheel"]:
+            if (name, wheel) not in found:
                 raise TableError(f"{where}: {what}; both wheels are needed")
         climbs.append(Climb(name, float(slope[0]), *(found[name, wheel] for wheel in WHEELS)))
     return ClimbData(tuple(climbs), found)
 
 
-def _slips(climbed: Table) -> dict[Key, float]:
-    """The slip of each wheel of each climb: its column, or by the speeds of body and rim."""
-    if "slip" in climbed:
-        slip, source = climbed["slip"], "slip"
-    elif all(name in climbed for name in SPEEDS):
-        speed, rim = (climbed[name] for name in SPEEDS)
+def _slips(driven: Table) -> dict[Key, float]:
+    """The slip of each wheel of each run: its column, or by the speeds of body and rim."""
+    if "slip" in driven:
+        slip, source = driven["slip"], "slip"
+    elif all(name in driven for name in SPEEDS):
+        speed, rim = (driven[name] for name in SPEEDS)
         largest, source = np.maximum(speed, rim), "speed_m_s"
         with np.errstate(invalid="ignore", divide="ignore"):
             slip = np.where(largest > 0.0, (rim - speed) / largest, np.nan)
     else:
         raise TableError(
-            f"{climbed.source}: column slip is missing; needed is slip, or speed_m_s and "
+            f"{driven.source}: column slip is missing; needed is slip, or speed_m_s and "
             "rim_speed_m_s of each wheel"
         )
     slips: dict[Key, float] = {}
-    for row, key in enumerate(zip(climbed["run"], climbed["wheel"], strict=True)):
+    for row, key in enumerate(zip(driven["run"].tolist(), driven["wheel"].tolist(), strict=True)):
         if key in slips:
             raise TableError(
-                f"{climbed.place(row)}: run {key[0]} has a second row for its {key[1]} wheel; "
+                f"{driven.place(row)}: run {key[0]} has a second row for its {key[1]} wheel; "
                 "give each repetition a name of its own"
             )
         if not abs(slip[row]) < 1.0:
             raise TableError(
-                f"{climbed.place(row)}, column {source}: gives slip {slip[row]:.3g}; needed is a "
+                f"{driven.place(row)}, column {source}: gives slip {slip[row]:.3g}; needed is a "
                 "slip between -1 and 1"
             )
         slips[key] = float(slip[row])
     return slips
-
-
-def _one_slip(rows: Table, where: str, runs: str) -> float:
-    """Slip of one wheel in a run that is no climb, from the table of stresses."""
-    read = rows["slip"] if "slip" in rows else np.zeros(0)
-    read = read[~np.isnan(read)]
-    if len(read) == 0 or np.ptp(read) > 0.0:
-        given = "no slip" if len(read) == 0 else f"slip is {read.min():g} to {read.max():g}"
-        raise TableError(
-            f"{where}: {given}; needed is one value in column slip, or this run and wheel in {runs}"
-        )
-    return float(read[0])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,7 +58,7 @@ BEYOND_PEAK: dict[str, tuple[Effect, ...]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class DiscreteGrousers:
-    """DiscreteGrousers of a track one by one, as eqs. 10 to 14 of Wang et al. 2018 have them.
+    """Grousers of a track one by one, as eqs. 10 to 14 of Wang et al. 2018 have them.
 
     pitch, tip: Distance from one to the next, l_l, and length of its top, l_w, m.
     friction: f_g, coefficient of friction of soil that has yielded.
@@ -128,26 +127,11 @@ def grouser_pull(
     return np.asarray(2.0 * each.sum(axis=1) + grousers.tip / grousers.pitch * bare)
 
 
-@dataclass(frozen=True)
-class TrackBalance:
-    """Equilibrium of one track; arrays of the operating points' shape."""
-
-    front: Any  # share of the load under the front wheel
-    middle: Any  # share under the belt between the wheels
-    rear: Any  # share under the rear wheel
-    trim: Any  # rad, psi, tail down
-    arc_radius: Any  # m, R_t
-    tension: Any  # N, mean tension from pressure and radius of the middle arc
-    tension_gain: Any  # N, increase of the tension by shear along the middle arc
-    centre: Any  # m, centre of pressure behind the middle of the base
-
-
-def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -> TrackBalance:
-    r"""Distribution of the load, belt tension and centre of pressure of a track in equilibrium.
+def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -> dict[str, Floats]:
+    r"""How a track stands in the soil, by names of columns, at operating points (...).
 
     .. math::
-        T = b R_t \bar\sigma, \quad \Delta T = b \int \tau \, ds, \quad
-        x = \frac{1}{W} \int (X - x) \, dW
+        T = b R_t \bar\sigma, \quad x = \frac{1}{W} \int (X - x) \, dW
 
     A belt without bending stiffness on a circular arc has the tension b R_t sigma at every point;
     since the pressure varies along the arc, the mean tension is returned. The trim angle follows
@@ -161,6 +145,13 @@ def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -
         Soil parameters, and slip and load of one track.
     points
         Points along the belt for the integrals.
+
+    Returns
+    -------
+    dict
+        Shares of the load under front wheel, belt and rear wheel; the trim, tail down (rad); the
+        sinkage of the rear wheel (m); the tension of the belt (N); the centre of pressure behind
+        the middle of the base (m). NaN without equilibrium.
 
     Raises
     ------
@@ -176,60 +167,42 @@ def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -
     >>> from soilml import Model, Operating, soil
     >>> at = Operating(slip=0.2, load=WANG2018.load)
     >>> balance = track_balance(Model(WANG2018.track), soil("wang2018/sand"), at)
-    >>> [round(float(share), 2) for share in (balance.front, balance.middle, balance.rear)]
+    >>> [round(float(balance[f"{part}_share"]), 2) for part in ("front", "belt", "rear")]
     [0.14, 0.8, 0.05]
     """
-    track, force = track_of(model), model(soil, at)
-    belt = track.contact_geometry(force.sinkage, soil, at)
+    track = track_of(model)
+    belt = track.contact_geometry(model(soil, at).sinkage, soil, at)
     profile = model.profile(soil, at, points)
-    ends = [distance_along(belt, a, i) for a, i in ((FRONT, -belt.leave), (MIDDLE, belt.meet))]
+    front_end, _ = distance_along(belt, FRONT, -belt.leave)
+    middle_end, _ = distance_along(belt, MIDDLE, belt.meet)
     step = distance_along(belt, REAR, -belt.exit)[0] / (points - 1)
     way = step * np.arange(points).reshape(-1, *[1] * np.ndim(step))
-    lift = profile.normal * np.cos(profile.angle) + profile.shear * np.sin(profile.angle)
-    front, rear = way < ends[0][0], way > ends[1][0]
-    middle = ~front & ~rear
+    front, rear = way < front_end, way > middle_end
     weight = np.full_like(way, 1.0) * step
     weight[[0, -1]] *= 0.5
-    load = np.sum(lift * weight, axis=0)
+    lift = profile.normal * np.cos(profile.angle) + profile.shear * np.sin(profile.angle)
+    carried = lift * weight
+    load = np.sum(carried, axis=0)
     level = np.cos(profile.angle) * step
     ahead = np.cumsum(level, axis=0) - 0.5 * (level + level[:1])  # behind the entry
     below_front = track.radius * np.sin(belt.entry)
-    centre = np.sum(ahead * lift * weight, axis=0) / load - below_front
+    centre = np.sum(ahead * carried, axis=0) / load - below_front
     length = belt.arc_radius * (belt.leave + belt.meet)
-    pressure = np.sum(profile.normal * weight * middle, axis=0) / length
-    return TrackBalance(
-        front=np.sum(lift * weight * front, axis=0) / load,
-        middle=np.sum(lift * weight * middle, axis=0) / load,
-        rear=np.sum(lift * weight * rear, axis=0) / load,
-        trim=belt.trim,
-        arc_radius=belt.arc_radius,
-        tension=track.width * belt.arc_radius * pressure,
-        tension_gain=track.width * np.sum(profile.shear * weight * middle, axis=0),
-        centre=centre - 0.5 * track.base * np.cos(belt.trim),
-    )
+    pressure = np.sum(profile.normal * weight * ~(front | rear), axis=0) / length
+    return {
+        "front_share": np.sum(carried * front, axis=0) / load,
+        "belt_share": np.sum(carried * ~(front | rear), axis=0) / load,
+        "rear_share": np.sum(carried * rear, axis=0) / load,
+        "trim_rad": belt.trim,
+        "rear_sinkage_m": belt.rear,
+        "belt_tension_N": track.width * belt.arc_radius * pressure,
+        "pressure_centre_m": centre - 0.5 * track.base * np.cos(belt.trim),
+    }
 
 
 def balanced_rows(case: Case, table: Table) -> Table:
-    """Simulated rows with how the track stands in the soil.
-
-    Added are the shares of the load under front wheel, belt and rear wheel, the trim (rad), the
-    sinkage of the rear wheel (m), the tension of the belt (N), and the centre of pressure behind
-    the middle (m). Raises `InputError` for another gear.
-    """
-    track, at, columns = track_of(case.model), operating_points(table), dict(table.columns)
-    balance = track_balance(case.model, case.soil, at)
-    belt = track.contact_geometry(columns["sinkage_m"], case.soil, at)
-    own = {
-        "front_share": balance.front,
-        "belt_share": balance.middle,
-        "rear_share": balance.rear,
-        "trim_rad": balance.trim,
-        "rear_sinkage_m": belt.rear,
-        "belt_tension_N": balance.tension,
-        "pressure_centre_m": balance.centre,
-    }
-    answered = np.isfinite(columns["sinkage_m"])
-    columns |= {name: np.where(answered, value, np.nan) for name, value in own.items()}
+    """Simulated rows with what `track_balance` says of each."""
+    columns = table.columns | track_balance(case.model, case.soil, operating_points(table))
     columns["status"] = columns.pop("status")  # the last, as in every table
     return replace(table, columns=columns)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,18 +16,18 @@ from soilml.identification import Fit, identify
 from soilml.io.table import Table
 from soilml.physics.gears.track_belt import Belt
 from soilml.physics.operating_point import Operating
-from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED
+from soilml.report.column_figure import column_picture
 from soilml.report.numbers import format_quantity
-from soilml.report.report import Picture, Report
+from soilml.report.report import Report
 from soilml.report.tables import ReportTable
 from soilml.systems.tracked_robot.robot import (
+    GRAVITY,
     DiscreteGrousers,
     TrackedRobot,
     grouser_pull,
     track_of,
 )
 from soilml.systems.tracked_robot.signals import (
-    low_pass,
     rear_sinkage,
     slip_from_displacements,
     stationary_mean,
@@ -36,9 +37,14 @@ from soilml.systems.tracked_robot.signals import (
 #: payload (N); further ones of the laser distances (m) and the inclination, tail down (rad).
 LOG = ("run", "time_s", "belt_travel_m", "travel_m", "tension_N")
 LASERS = ("front_laser_m", "rear_laser_m", "inclination_rad")
-#: Cutoff of the low-pass of the lasers, Hz; windows of the stationary part whose slips scatter.
-CUTOFF, WINDOWS = 2.0, 8
-POINTS = 401  # Points along the belt and along the curve
+WINDOWS = 8  # Of the stationary part, whose slips scatter
+POINTS = 401  # Points along the belt
+#: Columns of each panel of the picture; the last has figure 8 of the source.
+PANELS = (
+    ("pull_predicted_N", "pull_with_grousers_N"),
+    ("rear_sinkage_predicted_m",),
+    ("front_entry_rad", "front_exit_rad", "rear_entry_rad", "rear_exit_rad"),
+)
 
 
 @dataclass(frozen=True)
@@ -56,97 +62,79 @@ class TrackLog:
     case: Case
     grousers: DiscreteGrousers | None
 
-    @property
-    def at(self) -> Operating:
-        """The operating points of the rows."""
-        return Operating(slip=self.rows["slip"], load=self.rows["load_N"])
+    @cached_property
+    def columns(self) -> dict[str, Any]:
+        """The rows with the model's pull, rear sinkage and angles of the belt (fig. 8, rad)."""
+        at = Operating(slip=self.rows["slip"], load=self.rows["load_N"])
+        force, belt = self.case.model(self.case.soil, at), self._belt(at)
+        found = {**self.rows.columns, "pull_predicted_N": np.asarray(force.drawbar_pull)}
+        found["rear_sinkage_predicted_m"] = np.asarray(belt.rear)
+        if self.grousers is not None:
+            mass = 2.0 * self.rows["load_N"][0] / GRAVITY
+            robot = TrackedRobot(track_of(self.case.model), mass)
+            found["pull_with_grousers_N"] = 0.5 * np.asarray(
+                [
+                    grouser_pull(robot, self.case.soil, slip, self.grousers).mean()
+                    for slip in self.rows["slip"].tolist()
+                ]
+            )
+        angles = {
+            "front_entry": belt.entry,
+            "front_exit": belt.leave,
+            "rear_entry": belt.meet,
+            "rear_exit": belt.exit,
+        }
+        return found | {f"{name}_rad": np.asarray(angle) for name, angle in angles.items()}
 
-    def belt(self, at: Operating) -> Belt:
+    def _belt(self, at: Operating) -> Belt:
         """The line of the belt at operating points, by the model in equilibrium."""
         sunk = np.asarray(self.case.model(self.case.soil, at).sinkage)
         return track_of(self.case.model).contact_geometry(sunk, self.case.soil, at)
 
     @property
-    def columns(self) -> dict[str, Any]:
-        """The rows with the model's pull, rear sinkage and angles of the belt (fig. 8, rad)."""
-        belt = self.belt(self.at)
-        force = self.case.model(self.case.soil, self.at)
-        found = {**self.rows.columns, "pull_predicted_N": np.asarray(force.drawbar_pull)}
-        found["rear_sinkage_predicted_m"] = np.asarray(belt.rear)
-        if self.grousers is not None:
-            robot = TrackedRobot(track_of(self.case.model), 2.0 * self.rows["load_N"][0] / 9.81)
-            pulls = [
-                0.5 * grouser_pull(robot, self.case.soil, float(s), self.grousers).mean()
-                for s in self.rows["slip"]
-            ]
-            found["pull_with_grousers_N"] = np.asarray(pulls)
-        names = {"front_entry": "entry", "front_exit": "leave", "rear_entry": "meet"}
-        names["rear_exit"] = "exit"
-        return found | {f"{k}_rad": np.asarray(getattr(belt, v)) for k, v in names.items()}
-
-    def belt_line(self, slip: float) -> tuple[Floats, Floats]:
-        """Distance backwards from the entry and depth (m) along the belt (fig. 7), (POINTS,)."""
-        at = Operating(slip=np.asarray([slip]), load=self.rows["load_N"][:1])
-        track = track_of(self.case.model)
-        angle, contact = track.profile_contact(self.belt(at), at, POINTS)
-        angle, along = np.asarray(angle)[:, 0], np.asarray(contact.surface_travel)[:, 0]
-        step = np.diff(along)
-        middle = 0.5 * (angle[1:] + angle[:-1])
-        return np.append(0.0, np.cumsum(np.cos(middle) * step)), np.append(
-            0.0, np.cumsum(np.sin(middle) * step)
+    def belt_line(self) -> dict[str, Floats]:
+        """Distance from the entry and height (m) along the belt at the median slip (fig. 7)."""
+        at = Operating(
+            slip=np.median(self.rows["slip"], keepdims=True), load=self.rows["load_N"][:1]
         )
+        angle, contact = track_of(self.case.model).profile_contact(self._belt(at), at, POINTS)
+        angle, along = np.asarray(angle)[:, 0], np.asarray(contact.surface_travel)[:, 0]
+        step, middle = np.diff(along), 0.5 * (angle[1:] + angle[:-1])
+        return {
+            "along_m": np.append(0.0, np.cumsum(np.cos(middle) * step)),
+            "height_m": np.append(0.0, np.cumsum(-np.sin(middle) * step)),
+        }
 
     def report(self, title: str = "Soil from the pulls of a tracked robot") -> Report:
         """The soil by the pulls, how far the model is off, and a row for each pull."""
-        found = self.columns
-        off = format_quantity(
-            float(np.sqrt(np.mean((found["pull_predicted_N"] - found["drawbar_pull_N"]) ** 2))), "N"
-        )
-        said = f"The pull of a track is off by {off} in {len(self.rows)} pulls"
-        fit = self.fit
+        found, fit = self.columns, self.fit
+        off = np.sqrt(np.mean((found["pull_predicted_N"] - found["drawbar_pull_N"]) ** 2))
+        said = f"The pull of a track is off by {format_quantity(float(off), 'N')}"
+        said += f" in {len(self.rows)} pulls."
+        panels = [tuple(name for name in panel if name in found) for panel in PANELS]
+        read = {"pull_predicted_N": "drawbar_pull_N", "rear_sinkage_predicted_m": "rear_sinkage_m"}
+        measured = {name: found[own] for name, own in read.items() if own in found}
         return Report(
             kind="track",
-            verdict=f"{said}." if fit is None else fit.verdict,
-            lines=[] if fit is None else [f"{said}."],
+            verdict=said if fit is None else fit.verdict,
+            lines=[] if fit is None else [said],
             figures=None if fit is None else ReportTable.of_parameters("Soil", fit.frame_columns()),
             tables=[ReportTable.of("Pulls", found)],
             pictures=[
-                Picture("Pull, sinkage, belt and angles", self._draw, 2, 2, (9.0, 6.8), f"{said}.")
+                column_picture(
+                    found,
+                    "slip",
+                    panels,
+                    title="Pull, sinkage and angles of the belt",
+                    measured={"slip": found["slip"], **measured},
+                ),
+                column_picture(
+                    self.belt_line, "along_m", [("height_m",)], title="Line of the belt"
+                ),
             ],
             remarks=() if fit is None else fit.warnings,
             title=title,
         )
-
-    def _draw(self, axes: Any) -> None:
-        found, slip = self.columns, self.rows["slip"]
-        curve = Operating(slip=np.linspace(0.01, 0.95, 60), load=self.rows["load_N"][0])
-        pull, sunk, line, angles = axes.flat
-        smooth = np.asarray(self.case.model(self.case.soil, curve).drawbar_pull)
-        std = found.get("drawbar_pull_N_std")
-        pull.errorbar(slip, found["drawbar_pull_N"], std, fmt="o", color=BEFORE, label="log")
-        pull.plot(curve.slip, smooth, color=AFTER, label="model")
-        if self.grousers is not None:
-            pull.plot(slip, found["pull_with_grousers_N"], "s", color=UNCHANGED, label="grousers")
-        pull.set(xlabel="slip", ylabel="drawbar pull of a track, N")
-        pull.legend()
-        if "rear_sinkage_m" in found:
-            sunk.plot(found["drawbar_pull_N"], 1e3 * found["rear_sinkage_m"], "o", color=BEFORE)
-        order = np.argsort(found["pull_predicted_N"])
-        sunk.plot(
-            found["pull_predicted_N"][order], 1e3 * found["rear_sinkage_predicted_m"][order],
-            color=AFTER,
-        )  # fmt: skip
-        sunk.set(xlabel="drawbar pull of a track, N", ylabel="sinkage of the rear wheel, mm")
-        sunk.set_ylim(bottom=0.0)
-        x, depth = self.belt_line(float(np.median(slip)))
-        line.plot(x, -1e3 * depth, color=AFTER)
-        line.axhline(0.0, color="#888888", lw=0.7)
-        line.set(xlabel="along the belt, from its entry, m", ylabel="height, mm")
-        for name in ("front_entry", "front_exit", "rear_entry", "rear_exit"):
-            words = name.replace("_", " ")
-            angles.plot(slip, np.rad2deg(found[f"{name}_rad"]), "o-", ms=3, label=words)
-        angles.set(xlabel="slip", ylabel="angle, degrees")
-        angles.legend(fontsize=8)
 
 
 def steady_pulls(log: Table, load: float, spacing: float | None = None) -> Table:
@@ -176,8 +164,7 @@ def steady_pulls(log: Table, load: float, spacing: float | None = None) -> Table
                 "drawbar_pull_N_std": 0.5 * steady.std_error,
             }
             if with_lasers and spacing is not None:
-                rate = 1.0 / float(np.median(np.diff(rows["time_s"])))
-                front, rear, angle = (low_pass(rows[k], rate, CUTOFF)[part] for k in LASERS)
+                front, rear, angle = (rows[name][part] for name in LASERS)
                 row["rear_sinkage_m"] = float(rear_sinkage(rear, front, angle, spacing).mean())
         except (FitError, InputError) as error:
             raise TableError(f"{log.source}, run {name}: {error}") from None

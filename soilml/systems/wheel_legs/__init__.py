@@ -9,10 +9,9 @@ Saaj, IEEE Transactions on Robotics 33(6), 2017.
 from soilml.systems.wheel_legs.gaits import gait_metrics
 from soilml.systems.wheel_legs.resistive_force import LinearGround, WheelLeg, wheel_leg
 from soilml.systems.wheel_legs.stances import SpringLeg, simulate_stance, vibration_amplitude
-from soilml.systems.wheel_legs.stride_relations import LegSoil, SlipRelation, soil_of_sinkage
+from soilml.systems.wheel_legs.stride_relations import LegSoil, StrideRelation, soil_of_sinkage
 from soilml.systems.wheel_legs.strides import (
     Mobility,
-    StrideSlip,
     StrideSoil,
     mobility,
     slip_of_strides,
@@ -21,7 +20,7 @@ from soilml.systems.wheel_legs.strides import (
 from soilml.systems.wheel_legs.walk import Walk, WalkStatus, walk
 
 __all__ = [
-    "LegSoil", "LinearGround", "Mobility", "SlipRelation", "SpringLeg", "StrideSlip", "StrideSoil",
+    "LegSoil", "LinearGround", "Mobility", "SpringLeg", "StrideRelation", "StrideSoil",
     "Walk", "WalkStatus", "WheelLeg", "gait_metrics", "mobility", "simulate_stance",
     "slip_of_strides", "soil_of_sinkage", "soil_of_strides", "vibration_amplitude", "walk",
     "wheel_leg",

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.errors import FitError, InputError
@@ -21,15 +20,14 @@ from soilml.quantities import Z_90
 from soilml.remarks import Remark
 from soilml.report.column_figure import ParameterIntervals
 from soilml.report.numbers import format_quantity
-from soilml.report.report import Report
+from soilml.report.report import Picture, Report, by_group
 from soilml.report.tables import ReportTable
 from soilml.systems.wheel_legs.stride_relations import (
     GRAVITY,
     SINKAGE_RANGE,
-    TORQUE_SLIP,
-    VIBRATION_SLIP,
+    TORQUE,
+    VIBRATION,
     LegSoil,
-    find_relation,
     soil_of_sinkage,
 )
 
@@ -41,6 +39,12 @@ HEAVY_WHEEL, HEAVY_AT = Wheel(radius=0.15, width=0.18), Operating(slip=0.2, load
 #: cohesion (Pa) and shear modulus (m); draws of these and of the fused soil.
 UNKNOWN = {"n": (0.45, 0.95), "cohesion": (0.0, 1610.0), "shear_modulus": (0.0017, 0.0024)}
 DRAWS = 400
+#: The soil by readings and slips (n,) of strides, by sensor.
+BY_SENSOR: dict[str, Callable[[Floats, Floats], LegSoil]] = {
+    "torque": TORQUE.soil,
+    "vibration": VIBRATION.soil,
+    "sinkage": lambda sinkage, _: soil_of_sinkage(sinkage),
+}
 
 
 @dataclass(frozen=True)
@@ -51,8 +55,7 @@ class StrideSoil:
     there are several.
     covariance (2, 2): Of the last.
     strides (sensors,): How many rows each sensor has.
-    unused: Why a sensor that was read gives no estimate, by sensor.
-    in_range: False where the mean sinkage is outside of the range of its relation.
+    remarks: Sensors without an estimate, and a mean sinkage outside of the range of its relation.
     """
 
     sensors: tuple[str, ...]
@@ -60,30 +63,10 @@ class StrideSoil:
     std: Floats
     covariance: Floats
     strides: tuple[int, ...]
-    unused: Mapping[str, str]
-    in_range: bool
-
-    @property
-    def remarks(self) -> list[Remark]:
-        """Sensors without an estimate, and a sinkage outside of the range of its relation."""
-        found = [
-            Remark("unused", f"no estimate from {sensor}: {why}", (sensor,))
-            for sensor, why in self.unused.items()
-        ]
-        if not self.in_range:
-            low, high = (1e3 * end for end in SINKAGE_RANGE)
-            text = f"the mean sinkage is outside of the {low:.0f} to {high:.0f} mm of its relation"
-            found.append(Remark("outside-range", text, ("sinkage",)))
-        return found
+    remarks: tuple[Remark, ...]
 
 
-def soil_of_strides(
-    slip: Floats,
-    readings: Mapping[str, Floats],
-    *,
-    torque_model: str = "simplified",
-    vibration_model: str = "linear",
-) -> StrideSoil:
+def soil_of_strides(slip: Floats, readings: Mapping[str, Floats]) -> StrideSoil:
     """Estimate one soil from slip and torque, vibration and sinkage at midstance.
 
     Fused with the weights of the paper, which follow from the scatter of its table VIII. The errors
@@ -96,13 +79,11 @@ def soil_of_strides(
     readings
         `torque` (N m), `vibration` (m/s^2) and `sinkage` (m) of each stride (n,), one or more of
         them; NaN where not measured.
-    torque_model, vibration_model
-        Names in `TORQUE_SLIP` and `VIBRATION_SLIP`.
 
     Raises
     ------
     InputError
-        For readings that are not valid, an unknown model, and where nothing was measured.
+        For readings that are not valid, and where nothing was measured.
     FitError
         Where no sensor gives an estimate, with the reasons.
 
@@ -117,18 +98,10 @@ def soil_of_strides(
     (('torque', 'sinkage', 'fused'), [40.0, 39.0, 39.0])
     """
     slip = np.atleast_1d(np.asarray(slip, float))
-    torque = find_relation(torque_model, TORQUE_SLIP)
-    vibration = find_relation(vibration_model, VIBRATION_SLIP)
-    solve: dict[str, Callable[[Floats, Floats], LegSoil]] = {
-        "torque": lambda value, at: torque.soil(value, at),
-        "vibration": lambda value, at: vibration.soil(value, at),
-        "sinkage": lambda value, _: soil_of_sinkage(value),
-    }
     found: dict[str, LegSoil] = {}
     strides: list[int] = []
-    unused: dict[str, str] = {}
-    in_range = True
-    for sensor in (name for name in solve if name in readings):
+    unused: list[Remark] = []
+    for sensor in (name for name in BY_SENSOR if name in readings):
         value = np.atleast_1d(np.asarray(readings[sensor], float))
         if value.shape != slip.shape:
             raise InputError(
@@ -138,30 +111,32 @@ def soil_of_strides(
         if not read.any():
             continue
         try:
-            found[sensor] = solve[sensor](value[read], slip[read])
+            found[sensor] = BY_SENSOR[sensor](value[read], slip[read])
         except FitError as error:
-            unused[sensor] = str(error)
+            unused.append(Remark("unused", f"no estimate from {sensor}: {error}", (sensor,)))
             continue
         strides.append(int(read.sum()))
-        if sensor == "sinkage":
-            in_range = bool(SINKAGE_RANGE[0] <= value[read].mean() <= SINKAGE_RANGE[1])
+        low, high = SINKAGE_RANGE
+        if sensor == "sinkage" and not low <= value[read].mean() <= high:
+            text = f"the mean sinkage is outside of the {1e3 * low:.0f} to {1e3 * high:.0f} mm "
+            unused.append(Remark("outside-range", f"{text}of its relation", (sensor,)))
     if not found and not unused:
         raise InputError("nothing was measured: give torque, vibration or sinkage of each stride")
     if not found:
-        raise FitError("; ".join(f"{sensor}: {why}" for sensor, why in unused.items()))
-    each, names = list(found.values()), tuple(found)
-    mean, std = np.stack([one.mean for one in each]), np.stack([one.std for one in each])
-    covariance = each[0].covariance
+        raise FitError("; ".join(remark.text for remark in unused))
+    each, sensors = list(found.values()), tuple(found)
+    mean = np.stack([one.mean for one in each])
+    weights = np.ones((1, 2))
     if len(each) > 1:
         weights = pairwise(mean, np.asarray([one.errors.scatter for one in each])).weights
         mean = np.vstack([mean, (weights * mean).sum(axis=0)])
-        shared = sum(w[:, None] * one.deviations for w, one in zip(weights, each, strict=True))
-        covariance = shared @ shared.T + sum(
-            np.outer(w, w) * one.of_strides for w, one in zip(weights, each, strict=True)
-        )
-        std = np.vstack([std, np.sqrt(np.diag(covariance))])
-        names, strides = (*names, "fused"), [*strides, max(strides)]
-    return StrideSoil(names, mean, std, covariance, tuple(strides), unused, in_range)
+        sensors, strides = (*sensors, "fused"), [*strides, max(strides)]
+    pairs = list(zip(weights, each, strict=True))
+    shared = np.sum([w[:, None] * one.deviations for w, one in pairs], axis=0)
+    of_strides = np.sum([np.outer(w, w) * one.of_strides for w, one in pairs], axis=0)
+    covariance = shared @ shared.T + of_strides
+    std = np.stack([*(one.std for one in each), np.sqrt(np.diag(covariance))])[: len(sensors)]
+    return StrideSoil(sensors, mean, std, covariance, tuple(strides), tuple(unused))
 
 
 @dataclass(frozen=True)
@@ -229,123 +204,111 @@ def mobility(
     )
 
 
+def stride_columns(soil: StrideSoil, means: Mobility) -> dict[str, list[Any]]:
+    """A row for each sensor by names of columns; the last one has what the soil means."""
+    before = len(soil.sensors) - 1
+    likely = means.traffic_class
+    of_last: dict[str, Any] = {
+        "kphi_SI": means.kphi,
+        "pull_efficiency": means.efficiency,
+        "pull_efficiency_p05": means.ends[0],
+        "pull_efficiency_p95": means.ends[1],
+        "traffic_class": likely,
+        "class_probability": means.probability[likely],
+    }
+    return {
+        "sensor": list(soil.sensors),
+        "friction_angle_rad": soil.mean[:, 0].tolist(),
+        "friction_angle_rad_std": soil.std[:, 0].tolist(),
+        "normal_stiffness_Pa": soil.mean[:, 1].tolist(),
+        "normal_stiffness_Pa_std": soil.std[:, 1].tolist(),
+        **{
+            name: ["" if isinstance(value, str) else np.nan] * before + [value]
+            for name, value in of_last.items()
+        },
+        "strides": list(soil.strides),
+    }
+
+
 def stride_report(
     found: Mapping[str, tuple[StrideSoil, Mobility]], failed: Mapping[str, str], by: str | None
-) -> tuple[Report, dict[str, Any]]:
-    """What strides say of soils by name, and a row for each sensor by names of columns.
+) -> Report:
+    """What strides say of one soil, or of soils by name; `failed` says why others have none."""
+    reports = {name: _report_of_one(*own) for name, own in found.items()}
+    if by is None:
+        return next(iter(reports.values()))
+    worst = min(found, key=lambda name: found[name][1].efficiency)
+    verdict = f"The worst of {len(found)} soils is {worst}."
+    whole = by_group(reports, failed, by, verdict, "Soil from strides")
+    return replace(whole, pictures=[_picture({name: soil for name, (soil, _) in found.items()})])
 
-    failed: Why other groups have no soil. by: What tells the groups apart.
-    """
-    rows: dict[str, list[Any]] = {}
-    lines, remarks = [], []
-    for name, (soil, means) in found.items():
-        head, last = f"{by} {name}: " if by else "", len(soil.sensors) - 1
-        for k, sensor in enumerate(soil.sensors):
-            own = means if k == last else None
-            row: dict[str, Any] = {by: name} if by else {}
-            row |= {"sensor": sensor}
-            for i, column in enumerate(("friction_angle_rad", "normal_stiffness_Pa")):
-                row |= {column: soil.mean[k, i], f"{column}_std": soil.std[k, i]}
-            row |= {
-                "kphi_SI": own.kphi if own else np.nan,
-                "pull_efficiency": own.efficiency if own else np.nan,
-                "pull_efficiency_p05": own.ends[0] if own else np.nan,
-                "pull_efficiency_p95": own.ends[1] if own else np.nan,
-                "traffic_class": own.traffic_class if own else "",
-                "class_probability": own.probability[own.traffic_class] if own else np.nan,
-                "strides": soil.strides[k],
-            }
-            for key, value in row.items():
-                rows.setdefault(key, []).append(value)
-        angle, efficiency = (
-            format_quantity(float(soil.mean[-1, 0]), "rad", float(soil.std[-1, 0])),
-            format_quantity(means.efficiency, "share", 0.0, means.ends),
-        )
-        lines.append(
-            f"{head}friction angle {angle}; a heavy rover has a pull efficiency of {efficiency}: "
-            f"{means.traffic_class} ({means.probability[means.traffic_class]:.0%})"
-        )
-        remarks += [remark.under(head) for remark in soil.remarks]
-    remarks += [Remark("no-result", f"{by} {n} has no result: {why}") for n, why in failed.items()]
-    labels = [f"{n}: {s}" if by else s for n, (soil, _) in found.items() for s in soil.sensors]
-    value = np.concatenate([soil.mean for soil, _ in found.values()])
-    std = np.concatenate([soil.std for soil, _ in found.values()])
-    blank = np.full(2, np.nan)
-    figure = ParameterIntervals(
-        ("friction_angle", "normal_stiffness"), ("rad", "Pa"), labels,
-        value, value - Z_90 * std, value + Z_90 * std, blank, blank,
-    )  # fmt: skip
-    worst = min((means.efficiency, name) for name, (_, means) in found.items())
-    verdict = lines[0] if len(found) == 1 else f"The worst of {len(found)} soils is {worst[1]}"
-    report = Report(
+
+def _report_of_one(soil: StrideSoil, means: Mobility) -> Report:
+    angle = format_quantity(float(soil.mean[-1, 0]), "rad", float(soil.std[-1, 0]))
+    efficiency = format_quantity(means.efficiency, "share", 0.0, means.ends)
+    likely = means.traffic_class
+    return Report(
         kind="wheel-leg",
-        verdict=f"{verdict[0].upper()}{verdict[1:]}.",
-        lines=[f"{line}." for line in lines] if len(found) > 1 else [],
-        tables=[ReportTable.of("Soil by sensor", rows)],
-        pictures=[figure.picture()],
-        remarks=remarks,
+        verdict=f"Friction angle {angle}; a heavy rover has a pull efficiency of {efficiency}: "
+        f"{likely} ({means.probability[likely]:.0%}).",
+        tables=[ReportTable.of("Soil by sensor", stride_columns(soil, means))],
+        pictures=[_picture({"": soil})],
+        remarks=soil.remarks,
         title="Soil from strides",
     )
-    return report, rows
 
 
-@dataclass(frozen=True)
-class StrideSlip:
-    """Slip of strides (n,) by each sensor, and fused; NaN where nothing was measured.
-
-    by_sensor, std: By `torque` and `vibration`, (n,) each.
-    fused, fused_std: By the variances of both, (n,).
-    in_range: Whether the fused slip is one for which the relations were fitted, (n,).
-    """
-
-    by_sensor: Mapping[str, Floats]
-    std: Mapping[str, Floats]
-    fused: Floats
-    fused_std: Floats
-    in_range: NDArray[np.bool_]
+def _picture(soils: Mapping[str, StrideSoil]) -> Picture:
+    """Angle and stiffness by sensor of one soil, or of several by name."""
+    labels = [f"{name}: {s}" if name else s for name, soil in soils.items() for s in soil.sensors]
+    mean, std = (
+        np.concatenate([getattr(soil, part) for soil in soils.values()]) for part in ("mean", "std")
+    )
+    blank = np.full(2, np.nan)
+    return ParameterIntervals(
+        ("friction_angle", "normal_stiffness"), ("rad", "Pa"), labels,
+        mean, mean - Z_90 * std, mean + Z_90 * std, blank, blank,
+    ).picture()  # fmt: skip
 
 
 def slip_of_strides(
-    readings: Mapping[str, Floats],
-    friction_angle: float,
-    normal_stiffness: float,
-    *,
-    torque_model: str = "simplified",
-    vibration_model: str = "linear",
-) -> StrideSlip:
+    readings: Mapping[str, Floats], friction_angle: float, normal_stiffness: float
+) -> dict[str, Floats]:
     """Slip by the printed relations on a soil of this angle (rad) and stiffness sigma_1 (Pa).
 
     readings: `torque` (N m) and `vibration` (m/s^2) of each stride (n,), or one of them; NaN where
-        not measured. Other arguments as in `soil_of_strides`.
+        not measured.
 
-    Raises `InputError` for an unknown model, invalid standard deviations, and where nothing was
-    measured. References: Comin and Saaj 2017, eqs. 18, 24, 26 and 28, tables IV to VII. The error
-    of the relations is that of table VI, as for independent errors; on another soil or wheel-leg it
-    is larger.
+    Returns: Columns (n,): slip_by_torque, slip_by_vibration and, fused by their variances, slip,
+        with standard deviations; NaN where nothing was measured. `in_range` says whether the fused
+        slip is one for which the relations were fitted.
+
+    Raises `InputError` where nothing was measured. References: Comin and Saaj 2017, eqs. 18, 24, 26
+    and 28, tables IV to VII. The error of the relations is that of table VI, as for independent
+    errors; on another soil or wheel-leg it is larger.
 
     Examples
     --------
     >>> found = slip_of_strides({"torque": [1.1], "vibration": [2.0]}, 0.6981, 11300.0)
-    >>> {name: value.round(2).tolist() for name, value in found.by_sensor.items()}
-    {'torque': [0.24], 'vibration': [0.1]}
-    >>> found.fused.round(2).tolist(), found.fused_std.round(2).tolist()
-    ([0.17], [0.1])
+    >>> names = ("slip_by_torque", "slip_by_vibration", "slip", "slip_std")
+    >>> [round(float(found[name][0]), 2) for name in names]
+    [0.24, 0.1, 0.17, 0.1]
     """
-    relations = {
-        "torque": find_relation(torque_model, TORQUE_SLIP),
-        "vibration": find_relation(vibration_model, VIBRATION_SLIP),
-    }
-    found, std = {}, {}
-    for name, relation in relations.items():
+    columns: dict[str, Floats] = {}
+    for name, relation in (("torque", TORQUE), ("vibration", VIBRATION)):
         if name in readings and np.isfinite(value := np.asarray(readings[name], float)).any():
             a, b = relation.line(friction_angle, normal_stiffness)
-            found[name] = np.asarray(a + b * value)
-            std[name] = np.where(np.isfinite(value), relation.slip_std, np.nan)
-    if not found:
+            columns[f"slip_by_{name}"] = np.asarray(a + b * value)
+            std = np.where(np.isfinite(value), relation.slip_std, np.nan)
+            columns[f"slip_by_{name}_std"] = std
+    if not columns:
         raise InputError("nothing was measured: give torque or vibration of each stride")
-    mean, each = (np.stack(list(values.values())) for values in (found, std))
+    mean, each = (np.stack(list(columns.values())[k::2]) for k in range(2))
     read = np.isfinite(mean)
     with np.errstate(invalid="ignore"):  # a stride without a reading has no weight: NaN
         both = inverse_variance(np.where(read, mean, 0.0), np.where(read, each, np.inf))
-    inside = (both.mean >= LOWEST) & (both.mean <= HIGHEST)
-    return StrideSlip(found, std, both.mean, np.where(read.any(axis=0), both.std, np.nan), inside)
+    return columns | {
+        "slip": both.mean,
+        "slip_std": np.where(read.any(axis=0), both.std, np.nan),
+        "in_range": (both.mean >= LOWEST) & (both.mean <= HIGHEST),
+    }

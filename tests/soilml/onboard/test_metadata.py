@@ -80,7 +80,6 @@ CHANGES = {
     [
         *((what, "estimate") for what in CHANGES),
         *((what, "export-c") for what in ("null as set", "without gear")),
-        *((what, "export-step") for what in ("null as set", "without gear")),
     ],
 )
 def test_a_malformed_entry_is_refused_by_every_command(
@@ -96,7 +95,7 @@ def test_a_malformed_entry_is_refused_by_every_command(
     monkeypatch.setattr(model_file, "create_session", created)
     file = signed(SOURCE, tmp_path / "m.onnx", **CHANGES[what])
     (tmp_path / "runs.csv").write_text(RUNS)
-    other = {"estimate": "runs.csv", "export-c": "m.c", "export-step": "step.onnx"}[command]
+    other = {"estimate": "runs.csv", "export-c": "m.c"}[command]
     assert main([command, str(file), str(tmp_path / other)]) == 2
     captured = capsys.readouterr()
     assert captured.err.count("\n") == 1 and "its metadata is damaged" in captured.err

@@ -1,12 +1,17 @@
 """A file written anew around the response that it has gives the answers that it gave."""
 
 import shutil
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from soilml.onboard.estimator import Estimator
-from training.export.stored_response import write_anew
+
+sys.path.insert(0, str(Path(__file__).parents[3] / "exported"))
+
+from stored_response import write_anew
 
 pytestmark = pytest.mark.slow
 

@@ -65,7 +65,7 @@ def test_a_soil_in_a_corner_of_the_prior_is_found(wheel_posterior):
     apart = []
     for index in range(len(sets.truth)):
         x = np.broadcast_to((0.97, 0.97, -0.97), (16, 1, 3))
-        answers = family.responses(sets.origin.designs[index], x)[:, 0]
+        answers = family.responses(sets.designs[index], x)[:, 0]
         torque = np.exp(answers[:, 0]) * sets.readings["load"][index]
         sets.readings["torque_std"][index] = 0.02 * torque
         sets.readings["torque"][index] = torque * (1.0 + 0.02 * rng.standard_normal(16))

@@ -1,10 +1,9 @@
-"""Operators that combine elements along axes: products of matrices, reductions, the largest."""
+"""Operators that combine elements along axes: products of matrices, reductions, quantiles."""
 
 from __future__ import annotations
 
 from math import prod
 
-from soilml.errors import ModelFileError
 from training.export_c.c_text import at, indices_of, nest, number, offset
 from training.export_c.operators.rearrangement import transposed
 from training.export_c.program import Node, Program, Translation
@@ -109,38 +108,6 @@ def translate_reduction(program: Program, node: Node) -> list[Tensor]:
     return [out]
 
 
-def _by_row(program: Program, node: Node, kernel: str, x: Tensor, rest: str, *outs: Tensor) -> None:
-    """A call for each row of a tensor along its last axis."""
-    rows = [prod(x.shape[:-1])]
-    names = ", ".join(at(t, offset([t.shape[-1]], indices_of(rows))) for t in outs)
-    source = at(x, offset([x.shape[-1]], indices_of(rows)))
-    name = program.shared.kernel(kernel, x.kind)
-    call = f"{name}({source}, {x.shape[-1]}, {rest}{names});"
-    program.emit(nest(rows, call), *outs, x)
-
-
-def translate_softmax(program: Program, node: Node) -> list[Tensor]:
-    """Exponentials over their sum along the last axis."""
-    x = program.stored(node.input(0))
-    if node.axis(x.rank, -1) != x.rank - 1:
-        raise ModelFileError("operator Softmax along another axis than the last is not known")
-    out = program.new(x.kind, x.shape)
-    _by_row(program, node, "softmax", x, "", out)
-    return [out]
-
-
-def translate_top(program: Program, node: Node) -> list[Tensor]:
-    """The largest elements along the last axis, in order, and their indices."""
-    x, count = program.stored(node.input(0)), (node.numbers(1, "k") or [1])[0]
-    if node.axis(x.rank, -1) != x.rank - 1 or not int(node.attributes.get("largest", 1)):
-        raise ModelFileError(
-            "operator TopK along another axis than the last, or of the least, is not known"
-        )
-    out, where = (program.new(kind, (*x.shape[:-1], count)) for kind in (x.kind, "int"))
-    _by_row(program, node, "largest_few", x, f"{count}, ", out, where)
-    return [out, where]
-
-
 def translate_quantiles(program: Program, node: Node) -> list[Tensor]:
     """The composite `training.set_posterior.posterior_summary.add_quantiles`."""
     deviations, std, weights, grid, spacing, ends = (program.stored(t) for t in node.given())
@@ -161,7 +128,5 @@ OPERATORS: dict[str, Translation] = {
     "Gemm": translate_gemm,
     "MatMul": translate_matmul,
     **dict.fromkeys(REDUCTIONS, translate_reduction),
-    "Softmax": translate_softmax,
-    "TopK": translate_top,
     "Quantiles": translate_quantiles,
 }

@@ -79,13 +79,6 @@ class PriorAxis:
         low, high = self.value(np.asarray([-1.0, 1.0]))
         return float(low), float(high)
 
-    @property
-    def log_density(self) -> float:
-        """Log of the prior's density at x = 0."""
-        return (
-            math.log(0.5) if self.tilt == 0.0 else math.log(0.5 * self.tilt / math.sinh(self.tilt))
-        )
-
 
 def prior_points(axes: Sequence[PriorAxis], free: int, count: int, seed: int) -> Floats:
     """Coordinates (count, p): quantiles of the prior, truncated normal where nearly known."""

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from soilml.arrays import Floats
 from soilml.config.model_settings import take_prior
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
-from soilml.onboard.set_contract import ABSENT_READING, ABSENT_STD
 from soilml.physics.contact import Force
 from soilml.physics.effects.base import Effect
 from soilml.physics.gears import Wheel
@@ -25,10 +25,10 @@ from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
     ContextValues,
-    Origin,
     SimulatedSets,
     WheelFamily,
     add_log_torque,
+    measured,
     run_patterns,
     typical_model_errors,
 )
@@ -256,20 +256,18 @@ class DimensionlessFamily(WheelFamily):
         kept &= np.isfinite(y).all(axis=(1, 2))
         designs, y, x, bearing_std = designs[kept], y[kept], x[kept], bearing_std[kept]
         load, radius = designs[..., LOAD], designs[..., RADIUS]
-        values = {
-            "torque": np.exp(y[..., 0]) * load * radius,
-            "sinkage": np.exp(y[..., 1]) * radius,
-            "drawbar_pull": y[..., 2] * load,
-        }
-        readings, noise = _measure(values, designs, rng)
+        values = [np.exp(y[..., 0]) * load * radius, np.exp(y[..., 1]) * radius, y[..., 2] * load]
+        noise, everything = _noise(load, rng)
+        readings = {"slip": designs[..., SLIP], "load": load}
+        readings |= measured(values, noise, everything, rng)
         columns = (RADIUS, WIDTH, BEARING, EXPONENT, None, COHESION_MAX, SHEAR_MODULUS_MAX)
         context = {
             name: bearing_std if k is None else designs[:, 0, k]
             for name, k in zip(CONTEXT, columns, strict=True)
         }
         truth = self.truth(x, (context["cohesion_max"], 1.0, context["shear_modulus_max"]))
-        origin = Origin(designs, x, bearing_std / BEARING_RANGE, radius[:, 0], noise)
-        return SimulatedSets(readings, context, truth, origin)
+        normal_std = bearing_std / BEARING_RANGE
+        return SimulatedSets(readings, context, truth, designs, x, normal_std, radius[:, 0], noise)
 
     def _draw_unknowns(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
         """Coordinates (count, p) of the prior, and `bearing_std` (count,)."""
@@ -285,33 +283,19 @@ class DimensionlessFamily(WheelFamily):
         return f"[any_wheel] {', '.join(said)}"
 
 
-def _measure(
-    values: dict[str, Floats], designs: Floats, rng: np.random.Generator
-) -> tuple[dict[str, Floats], dict[str, tuple[Floats, Floats]]]:
-    """Readings with noise, and their noise as in `Origin`, of true values (sets, rows)."""
-    load, sets = designs[..., LOAD], len(designs)
+def _noise(load: Floats, rng: np.random.Generator) -> tuple[dict[str, Floats], NDArray[np.bool_]]:
+    """Noise as in `SimulatedSets`, and which sets (sets, 1) have all channels."""
     least, most = TORQUE_NOISE
-    torque_noise = np.exp(rng.uniform(np.log(least), np.log(most), (sets, 1)))
-    biased = rng.random((sets, 1)) < SHARE_BIASED
-    bias = np.where(biased, rng.uniform(0.0, MOST_BIAS, (sets, 1)), 0.0)
-    all_channels = rng.random((sets, 1)) < SHARE_ALL_CHANNELS
-    stds = {
-        "torque": torque_noise * values["torque"],
-        "sinkage": SINKAGE_NOISE * values["sinkage"],
-        "drawbar_pull": PULL_NOISE * load,
-    }
-    readings = {"slip": designs[..., SLIP], "load": load, "torque_bias": bias * values["torque"]}
-    for name, value in values.items():
-        measured = all_channels | (name == "torque")
-        noisy = value + stds[name] * rng.standard_normal(value.shape)
-        readings[name] = np.where(measured, noisy, ABSENT_READING)
-        readings[f"{name}_std"] = np.where(measured, stds[name], ABSENT_STD)
-    readings["torque"] += readings["torque_bias"] * rng.standard_normal((sets, 1))
+    shape = (len(load), 1)
+    torque = np.exp(rng.uniform(np.log(least), np.log(most), shape))
+    biased = rng.random(shape) < SHARE_BIASED
+    bias = np.where(biased, rng.uniform(0.0, MOST_BIAS, shape), 0.0)
+    everything = rng.random(shape) < SHARE_ALL_CHANNELS
     none = np.zeros_like(load)
     noise = {
-        "torque": (none, torque_noise + none),
-        "sinkage": (none, SINKAGE_NOISE + none),
-        "drawbar_pull": (PULL_NOISE * load, none),
-        "torque_bias": (none, bias + none),
+        "torque": np.stack([none, torque + none]),
+        "sinkage": np.stack([none, SINKAGE_NOISE + none]),
+        "drawbar_pull": np.stack([PULL_NOISE * load, none]),
+        "torque_bias": np.stack([none, bias + none]),
     }
-    return readings, noise
+    return noise, everything

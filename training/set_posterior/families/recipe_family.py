@@ -15,12 +15,7 @@ from soilml.arrays import Floats
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
 from soilml.fitting.shared_errors import PULL_OFFSET_SHARE
-from soilml.onboard.set_contract import (
-    ABSENT_READING,
-    ABSENT_STD,
-    OPERATING_NOISE,
-    RESPONSE_CHANNELS,
-)
+from soilml.onboard.set_contract import OPERATING_NOISE, RESPONSE_CHANNELS
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
@@ -30,10 +25,10 @@ from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
     ContextValues,
-    Origin,
     SimulatedSets,
     WheelFamily,
     add_log_torque,
+    measured,
     run_patterns,
     typical_model_errors,
 )
@@ -175,27 +170,16 @@ class RecipeFamily(WheelFamily):
         slip, load, y, x = self._carried_sets(count, rows, rng)
         asinh_torque = 2.0 * self.linear_torque * np.sinh(y[..., 0])
         torque = asinh_torque if self.linear_torque else np.exp(y[..., 0]) * load
-        values = (torque, np.exp(y[..., 1]), y[..., 2] * load)
-        readings = {"slip": slip, "load": load}
-        all_channels = rng.random((len(x), 1)) < SHARE_ALL_CHANNELS
-        for name, value in zip(RESPONSE_CHANNELS, values, strict=True):
-            noise = self._noise.get(name)
-            measured = (noise is not None) & (all_channels | (name == "torque"))
-            std = np.full_like(value, ABSENT_STD) if noise is None else noise.std(value)
-            noisy = value + std * rng.standard_normal(std.shape)
-            readings[name] = np.where(measured, noisy, ABSENT_READING)
-            readings[f"{name}_std"] = np.where(measured, std, ABSENT_STD)
-        bias = self.recipe.bias.get(column("torque"), Noise())
-        readings["torque_bias"] = bias.std(torque)
-        readings["torque"] += readings["torque_bias"] * rng.standard_normal((len(x), 1))
-        named = self._noise | {"torque_bias": bias}
-        parts = {
-            name: (np.full(slip.shape, float(own.constant)), np.full(slip.shape, float(own.share)))
+        named = self._noise | {"torque_bias": self.recipe.bias.get(column("torque"), Noise())}
+        noise = {
+            name: np.stack([np.full(slip.shape, float(x)) for x in (own.constant, own.share)])
             for name, own in named.items()
         }
+        values = [torque, np.exp(y[..., 1]), y[..., 2] * load]
+        everything = rng.random((len(x), 1)) < SHARE_ALL_CHANNELS
+        readings = {"slip": slip, "load": load} | measured(values, noise, everything, rng)
         designs, none = np.stack([slip, load], axis=-1), np.zeros(len(x))
-        origin = Origin(designs, x, normal_std=none, length=none + 1.0, noise=parts)
-        return SimulatedSets(readings, {}, self.truth(x), origin)
+        return SimulatedSets(readings, {}, self.truth(x), designs, x, none, none + 1.0, noise)
 
     @property
     def _noise(self) -> dict[str, Noise]:

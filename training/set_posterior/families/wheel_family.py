@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, USUAL_SENSOR_ERRORS, without_errors
-from soilml.onboard.set_contract import INFERRED, LEAST_STD
+from soilml.onboard.set_contract import (
+    ABSENT_READING,
+    ABSENT_STD,
+    INFERRED,
+    LEAST_STD,
+    RESPONSE_CHANNELS,
+)
 from soilml.physics.effects.base import Effect
 from soilml.physics.effects.contact_shape import ExitAngle
 from soilml.physics.model import Model
@@ -54,33 +61,23 @@ class ContextValues:
 
 
 @dataclass(frozen=True)
-class Origin:
-    """How simulated sets were made, for the computation of their exact posterior.
-
-    `noise` has for each measured channel, and for `torque_bias`, its constant part and its share of
-    the true value, (sets, rows) each.
-    """
-
-    designs: Floats  # (sets, rows, d)
-    x: Floats  # (sets, p) coordinates of all unknowns
-    normal_std: Floats  # (sets,) prior standard deviation of the nearly known coordinates
-    length: Floats  # (sets,) unit of sinkage, and of torque over load, m
-    noise: dict[str, tuple[Floats, Floats]]
-
-
-@dataclass(frozen=True)
 class SimulatedSets:
-    """Simulated sets of one size.
+    """Simulated sets of one size, and what their exact posterior depends on.
 
     `readings` are sensor readings and their standard deviations by input name, (sets, rows);
-    `context` are the inputs of a whole set, (sets,); `truth` are the estimated
-    parameters (sets, q).
+    `context` are the inputs of a whole set, (sets,); `truth` are the estimated parameters
+    (sets, q). `noise` has for each measured channel, and for `torque_bias`, its constant part and
+    its share of the true value, (2, sets, rows).
     """
 
     readings: dict[str, Floats]
     context: dict[str, Floats]
     truth: Floats
-    origin: Origin
+    designs: Floats  # (sets, rows, d)
+    x: Floats  # (sets, p) coordinates of all unknowns
+    normal_std: Floats  # (sets,) prior standard deviation of the nearly known coordinates
+    length: Floats  # (sets,) unit of sinkage, and of torque over load, m
+    noise: dict[str, Floats]
 
     def rows(self, index: int) -> dict[str, Floats]:
         """The readings of one set (rows,)."""
@@ -90,16 +87,31 @@ class SimulatedSets:
         """The context inputs of one set."""
         return {name: float(values[index]) for name, values in self.context.items()}
 
-    def select(self, index: int) -> SimulatedSets:
-        """One of the sets."""
-        o, part = self.origin, slice(index, index + 1)
-        noise = {name: (a[part], b[part]) for name, (a, b) in o.noise.items()}
-        readings, context = (
-            {name: values[part] for name, values in own.items()}
-            for own in (self.readings, self.context)
-        )
-        own = Origin(o.designs[part], o.x[part], o.normal_std[part], o.length[part], noise)
-        return SimulatedSets(readings, context, self.truth[part], own)
+
+def measured(
+    values: Sequence[Floats],
+    noise: Mapping[str, Floats],
+    everything: NDArray[np.bool_],
+    rng: np.random.Generator,
+) -> dict[str, Floats]:
+    """Readings of the channels (sets, rows) with noise and the bias of torque, and their stds.
+
+    values: True values of torque, sinkage and drawbar pull.
+    noise: As in `SimulatedSets`, without channels that are never measured.
+    everything: Whether a set (sets, 1) has other channels than torque.
+    """
+    readings = {}
+    for name, value in zip(RESPONSE_CHANNELS, values, strict=True):
+        constant, share = noise.get(name, np.full((2, 1, 1), ABSENT_STD))
+        std = np.hypot(constant, share * value)
+        there = (name in noise) & (everything | (name == "torque"))
+        noisy = value + std * rng.standard_normal(value.shape)
+        readings[name] = np.where(there, noisy, ABSENT_READING)
+        readings[f"{name}_std"] = np.where(there, std, ABSENT_STD)
+    constant, share = noise["torque_bias"]
+    bias = np.hypot(constant, share * values[0])
+    readings["torque"] += bias * rng.standard_normal((len(bias), 1))
+    return readings | {"torque_bias": bias}
 
 
 def add_log_torque(readings: dict[str, Value], length: Value | float) -> tuple[Value, Value]:

@@ -10,27 +10,26 @@ from soilml.physics.user_effects import load_effects
 OWN = '''\
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar
+from dataclasses import replace
+from typing import Annotated
 
+from soilml import Effect, effect
 from soilml.arrays import Real
-from soilml.physics.effects import Effect, EffectCard
 from soilml.parameters import Parameter
 
 
-@dataclass(frozen=True, kw_only=True)
+@effect(
+    "crust",
+    text="a crust carries a part of the load",
+    source="own",
+    kind="soil",
+    reference={"strength": 5.0},
+    signs={"sinkage": -1},
+    isolate="the same runs on raked soil",
+)
 class Crust(Effect):
     """A crust carries a part of the load."""
 
-    name: ClassVar[str] = "crust"
-    about: ClassVar[EffectCard] = EffectCard(
-        text="a crust carries a part of the load",
-        source="own",
-        kind="soil",
-        reference={"strength": 5.0},
-        signs={"sinkage": -1},
-        isolate="the same runs on raked soil",
-    )
     strength: Annotated[Real, Parameter("N", 0.0, 50.0, "load that it carries")] = 0.0
 
     def on_force(self, force, scene):
@@ -65,13 +64,13 @@ def test_a_changed_file_is_read_again_and_nothing_is_left_beside_it(own):
     assert [path.name for path in own.parent.iterdir()] == ["my-effects.py"]
 
 
-ABOUT = OWN[OWN.index("    about") : OWN.index("    strength")]
+DECLARED = OWN[OWN.index("@effect") : OWN.index("class Crust")]
 
 
 @pytest.mark.parametrize(
     "old, new, said",
     [
-        (OWN, "x = 1\n", "no effect in it; one is a frozen dataclass with name, about and one of"),
+        (OWN, "x = 1\n", "no effect in it; one is a class under @effect(NAME, ...) with one of"),
         (OWN, "", "no effect in it"),
         ("replace(force", "replace((force", "line "),
         ("import annotations", "import annotation", "line 1: future feature annotation"),
@@ -80,17 +79,15 @@ ABOUT = OWN[OWN.index("    about") : OWN.index("    strength")]
         (OWN, "raise SystemExit('no')\n", "SystemExit when run: no"),
         (OWN, "raise ValueError('two\\nlines')\n", "ValueError when run: two lines"),
         ('"crust"', '"grousers"', "Crust: the catalogue has an effect 'grousers' already"),
-        ('    name: ClassVar[str] = "crust"\n', "", "Crust: name is missing"),
+        ('    source="own",\n', "", "TypeError when run: EffectCard.__init__() missing 1 required"),
         ('"crust"', '"my crust."', "Crust: name is 'my crust.'; it takes lower-case letters"),
-        (ABOUT, "", "Crust: about is missing"),
-        ('{"strength": 5.0}', "{}", "Crust: about.reference is empty"),
+        (DECLARED, "", "Crust: declare it: write @effect(NAME, ...) above the class"),
+        ('{"strength": 5.0}', "{}", "Crust: reference is empty"),
         ('{"strength": 5.0}', '{"size": 1.0}', "has 'size'; its parameters are: strength"),
-        ('{"strength": 5.0}', '{"strength": 99.0}', "about.reference strength is 99 N"),
+        ('{"strength": 5.0}', '{"strength": 99.0}', "reference strength is 99 N"),
         ("[Real, Parameter", "[Reel, Parameter", "types that exist and neutral defaults"),
         (" = 0.0\n", "\n", "Crust: its fields need types that exist and neutral defaults"),
         (" = 0.0\n", " = -1.0\n", "Crust: strength is -1 N"),
-        ("frozen=True, ", "", "TypeError when run: cannot inherit non-frozen dataclass"),
-        ("@dataclass(frozen=True, kw_only=True)\n", "", "an effect is decorated by @dataclass"),
         (
             "on_force",
             "on_forces",
@@ -99,11 +96,11 @@ ABOUT = OWN[OWN.index("    about") : OWN.index("    strength")]
         ("on_force", "forces", "Crust: it acts on nothing; it needs one of the methods on_op"),
         ("class Crust(Effect):", "class Crust(Base):", "NameError when run"),
         ("class Crust(Effect):", "class Crust:", "Crust: derive it from soilml.Effect"),
-        ('"soil"', '"water"', "about.kind is 'water'; there are: soil, wheel, rig, sensor"),
+        ('"soil"', '"water"', "kind is 'water'; there are: soil, wheel, rig, sensor"),
         (
-            "        signs",
-            "        needs=('moisture',),\n        signs",
-            "about.needs or uses has 'moisture'",
+            "    signs",
+            "    needs=('moisture',),\n    signs",
+            "needs or uses has 'moisture'",
         ),
     ],
 )
@@ -117,7 +114,7 @@ def test_what_is_wrong_is_said_in_one_line(own, old, new, said):
 
 
 def test_two_effects_of_one_name_are_refused(own):
-    again = OWN[OWN.index("@dataclass") :].replace("class Crust", "class Second")
+    again = OWN[OWN.index("@effect") :].replace("class Crust", "class Second")
     own.write_text(OWN + "\n\n" + again)
     with pytest.raises(InputError, match="Second: Crust is 'crust' already"):
         load_effects(own)

@@ -52,6 +52,6 @@ def test_features_in_the_graph_are_those_of_the_training(any_posterior):
     session = session_of(graph.model(shapes, {"features": (1, [5, "rows"])}))
     feed = {n: v.astype(np.float32) for n, v in sets.rows(2).items()}
     feed |= {n: np.asarray([v], np.float32) for n, v in sets.context_of(2).items()}
-    wanted = family.features(sets.origin.designs[2])
+    wanted = family.features(sets.designs[2])
     (found,) = session.run(None, feed)
     assert pytest.approx(wanted, abs=2e-5) == found.T
