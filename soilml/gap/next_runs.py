@@ -10,7 +10,6 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
-from soilml.fitting.candidate_effects import effect_names
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.covariance import Whitening
 from soilml.fitting.least_squares import Solution
@@ -18,7 +17,7 @@ from soilml.fitting.predictions import Linearisation, PredictionRequest, lineari
 from soilml.fitting.readings import Readings
 from soilml.gap.decision import Decision
 from soilml.gap.results import NextRun, Suspect
-from soilml.gap.run_options import CHECKS, RunOption, run_options, with_default_covariates
+from soilml.gap.run_options import CHECKS, run_options, with_default_covariates
 from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import scatter_columns, terms_like
 from soilml.inference.posterior import Posterior
@@ -101,19 +100,19 @@ def next_runs(posterior: Posterior, explanations: Sequence[Explanation]) -> list
 def _runs(posterior: Posterior, fits: Mapping[str, Solution]) -> Iterator[_Proposal]:
     """Runs that no explanation refuses, and that one at least tells from a plain repeat."""
     like, first = posterior.terms.readings, next(iter(fits.values()))
-    effects = sorted({name for fit in fits.values() for name in effect_names(fit.case)})
     asked = []
-    for option in run_options(like, first.fitted(), effects):
-        own = [_with_gear(fit, option) for fit in fits.values()]
+    for option in run_options(like, first.fitted()):
         points = (option.at,) if option.plain is None else (option.at, option.plain)
-        asked.append((option, own, [_request(at, f, like.channels) for at in points for f in own]))
-    lines = iter(linearise_many([request for *_, own in asked for request in own]))
-    for option, own, requests in asked:
+        asked.append(
+            (option, [_request(at, fit, like.channels) for at in points for fit in fits.values()])
+        )
+    lines = iter(linearise_many([request for _, own in asked for request in own]))
+    for option, requests in asked:
         answers = [next(lines) for _ in requests]
         found = [line for line in answers if not isinstance(line, InputError)]
         if len(found) < len(answers):
             continue
-        here, plain = found[: len(own)], found[len(own) :]
+        here, plain = found[: len(fits)], found[len(fits) :]
         readings = _readings_like(requests[0], like, here[0].prediction)
         least = SAME_PREDICTION * readings.std
         if plain and all(
@@ -122,27 +121,14 @@ def _runs(posterior: Posterior, fits: Mapping[str, Solution]) -> Iterator[_Propo
         ):
             continue
         try:
-            columns = scatter_columns(own[0].fitted(), readings)
+            columns = scatter_columns(first.fitted(), readings)
             terms, at = terms_like(posterior.terms, posterior.noise, readings, columns)
             whiten = terms.whiten(at, np.zeros(len(readings), bool))
         except (InputError, np.linalg.LinAlgError):
             continue
-        differences = [
-            _of_all_coordinates(fit, changed, _difference(whiten, here[0], line))
-            for fit, changed, line in zip(fits.values(), own, here, strict=True)
-        ]
+        differences = [_difference(whiten, here[0], line) for line in here[1:]]
         predicted = {name: line.prediction for name, line in zip(fits, here, strict=True)}
-        rows = _rows_of_run(option, readings, predicted)
-        yield _Proposal(option.kind, option.text, rows, differences[1:])
-
-
-def _with_gear(fit: Solution, option: RunOption) -> Solution:
-    """The fit on the gear of a run, without coordinates of effects that the gear has not."""
-    case = option.changed(fit.case)
-    known = case.parameters()
-    kept = [i for i, c in enumerate(fit.coordinates) if c.path in known]
-    own = replace(fit.problem, case=case, coordinates=[fit.coordinates[i] for i in kept])
-    return replace(fit, problem=own, x=fit.x[kept])
+        yield _Proposal(option.kind, option.text, _rows_of_run(readings, predicted), differences)
 
 
 def _request(at: Operating, fit: Solution, channels: Sequence[str]) -> PredictionRequest:
@@ -167,12 +153,11 @@ def _readings_like(request: PredictionRequest, like: Readings, measured: Floats)
     )
 
 
-def _rows_of_run(option: RunOption, readings: Readings, predicted: Mapping[str, Floats]) -> Rows:
+def _rows_of_run(readings: Readings, predicted: Mapping[str, Floats]) -> Rows:
     """Operating points and gear of a run with the prediction of each explanation."""
     at, count = readings.at, len(readings.run)
     columns: dict[str, Any] = {"gear": at.gear, "slip": at.slip, "load_N": at.load}
     columns |= {key: getattr(at, field) for field, key in COVARIATES.items()}
-    columns |= {"grouser_height_m": 0.0 if option.smooth else None}
     for name, y in predicted.items():
         for i, channel in enumerate(readings.channels):
             columns[f"{column(channel)} if {name}"] = y[readings.channel == i]
@@ -185,14 +170,6 @@ def _rows_of_run(option: RunOption, readings: Readings, predicted: Mapping[str, 
 def _difference(whiten: Whitening, first: Linearisation, rival: Linearisation) -> Difference:
     change = first.prediction - rival.prediction
     return np.asarray(whiten @ change), np.asarray(whiten @ rival.jacobian)
-
-
-def _of_all_coordinates(fit: Solution, changed: Solution, difference: Difference) -> Difference:
-    """The difference with the Jacobian of all coordinates of a fit: 0 for those dropped."""
-    kept = [c.path for c in changed.coordinates]
-    jacobian = np.zeros((len(difference[0]), len(fit.x)))
-    jacobian[:, [c.path in kept for c in fit.coordinates]] = difference[1]
-    return difference[0], jacobian
 
 
 def _checks(fits: Mapping[str, Solution]) -> Iterator[_Proposal]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,8 +34,6 @@ SLIP_STEPS = (0.05, 0.01)
 #: Heavier loads that are tried, as multiples of the heaviest driven, until the soil carries one:
 #: none above twice that load, for which the rig may not be built. The lighter load likewise.
 HEAVIER, LIGHTER = (1.5, 1.25), 0.6
-#: Effects of lugs, which a smooth gear does not have.
-LUG_EFFECTS = frozenset({"grousers", "track-grousers"})
 
 #: Checks of sensors and rig, and tests of the soil with a bevameter: kind -> (instruction, sizes of
 #: effects and soil parameters that it measures -> their standard deviations afterwards, in their
@@ -77,6 +75,10 @@ CHECKS: dict[str, tuple[str, dict[str, float | str]]] = {
         "tow the wheel, whose rolling radius is known, unpowered on hard ground and read its slip",
         {"slip-offset.offset": 0.002},
     ),
+    "measured lugs": (
+        "measure height and spacing of the lugs",
+        {"grousers.height": 0.001, "track-grousers.spacing": 0.05},
+    ),
     "plate test": (
         "press plates of two widths into the soil and fit pressure against sinkage",
         {"kc": "10 %", "kphi": "10 %", "n": 0.05},
@@ -98,30 +100,17 @@ class RunOption:
     """A possible run: its kind, a description, and its operating points.
 
     `plain` are the same slips and loads at usual covariates, where the run differs by one: the run
-    adds more than a repeat only if some model predicts other readings for it. `smooth` asks for a
-    gear without lugs.
+    adds more than a repeat only if some model predicts other readings for it.
     """
 
     kind: str
     text: str
     at: Operating
     plain: Operating | None = None
-    smooth: bool = False
-
-    def changed(self, case: Case) -> Case:
-        """The case with the gear of this run."""
-        if not self.smooth:
-            return case
-        effects = tuple(e for e in case.model.effects if e.name not in LUG_EFFECTS)
-        return replace(case, model=replace(case.model, effects=effects))
 
 
-def run_options(readings: Readings, case: Case, effects: Sequence[str]) -> Iterator[RunOption]:
-    """Runs that differ from those driven, at rows that the soil of the case carries.
-
-    `effects` are the names of those that the runs are to distinguish: a smooth gear is proposed
-    where one of them is of lugs, and the case has one gear.
-    """
+def run_options(readings: Readings, case: Case) -> Iterator[RunOption]:
+    """Runs that differ from those driven, at rows that the soil of the case carries."""
     at, loads, slips = readings.at, readings.row_load, readings.row_slip
     least, highest = float(slips.min()), float(slips.max())
     covariates = _usual(readings)
@@ -135,17 +124,13 @@ def run_options(readings: Readings, case: Case, effects: Sequence[str]) -> Itera
         given |= {"gear": gear} if gear else {}
         return Operating(slip=slip, **{k: np.full(slip.size, v) for k, v in given.items()})
 
-    def runs(
-        kind: str, text: str, slip: Floats, load: float, *, smooth: bool = False, **own: float
-    ) -> Iterator[RunOption]:
+    def runs(kind: str, text: str, slip: Floats, load: float, **own: float) -> Iterator[RunOption]:
         for gear in gears:
             what = f"{text} under {load:g} N" + (f", with the gear {gear}" if gear else "")
-            option = RunOption(kind, what, points(slip, load, gear, **own), smooth=smooth)
-            carries = carried_rows(option.changed(case), option.at)
-            if carries.sum() >= FEWEST_ROWS:
-                kept = slip[carries]
+            kept = slip[carried_rows(case, points(slip, load, gear, **own))]
+            if kept.size >= FEWEST_ROWS:
                 plain = points(kept, load, gear) if own else None
-                yield replace(option, at=points(kept, load, gear, **own), plain=plain)
+                yield RunOption(kind, what, points(kept, load, gear, **own), plain)
 
     heavier = [_whole(factor * float(loads.max())) for factor in HEAVIER]
     carried = (w for w in heavier if carried_rows(case, points(usual, w, gears[0])).all())
@@ -175,9 +160,6 @@ def run_options(readings: Readings, case: Case, effects: Sequence[str]) -> Itera
     if _unvaried(at.slip_angle):
         text = "the wheel at a slip angle of 0.2 rad"
         yield from runs("slip angle", text, usual, middle, slip_angle=0.2)
-    if LUG_EFFECTS.intersection(effects) and not case.gears:
-        text = "the same slips with lugs removed or covered"
-        yield from runs("smooth gear", text, usual, middle, smooth=True)
 
 
 def drivable_slips(low: float, high: float) -> Floats:
