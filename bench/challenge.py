@@ -1,7 +1,6 @@
-"""A challenge of blind sets: the gap workflow beside a process, on rows that were kept back.
+"""A challenge of blind sets: name their hidden causes, and predict rows that were kept back.
 
-    python bench/run.py challenge                              methods of the house
-    python bench/challenge.py make FOLDER TRUTH.json           sets for others, and their truth
+    python bench/challenge.py make FOLDER TRUTH.json           sets for entrants, and their truth
     python bench/challenge.py score FOLDER TRUTH.json ENTRY.json ...
 
 The truth has a random salt, and its SHA-256 is in the folder, so that nobody finds it by trial, and
@@ -15,33 +14,25 @@ import hashlib
 import json
 import secrets
 import sys
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-import challenge_methods as methods
 import numpy as np
-from challenge_methods import COLUMNS, NONE, UNKNOWN, SetData, stated
-from runner import Bench, Row, Sample, table
+from runner import Row, table
 
 from datagen.blind_sets import BlindSet, Plan, csv_text, draw_blind_set
-from datagen.blind_sets.plans import (
-    DISCREPANCIES,
-    FREE_COUNTS,
-    NOISE_LEVELS,
-    RUNS,
-    SIZES,
-    TIERS_WITHOUT_MECHANISM,
-    mechanism_keys,
-)
+from datagen.blind_sets.plans import TIERS_WITHOUT_MECHANISM, benchmark_plans
 from datagen.blind_sets.reading_errors import Sensor
-from datagen.blind_sets.soil_families import FAMILIES, RADIUS, WIDTH
+from datagen.blind_sets.soil_families import RADIUS, WIDTH
 from soilml.errors import InputError
 from soilml.physics.effects import EFFECTS
 from soilml.physics.gears import Wheel
+from soilml.quantities import CHANNELS, column
 
+COLUMNS = tuple(column(name) for name in CHANNELS)
+#: Answers beside the names of the catalogue: nothing is missing; something that is not listed.
+NONE, UNKNOWN = "none", "unknown"
 #: Tiers that have one right answer. Two causes together (M) and changing soils (T) have several.
 TIERS = ("A", "B", "C", "S", "L", "D", "N0", "N1")
 #: Causes outside the catalogue that one of its effects describes too: two answers are right.
@@ -49,91 +40,36 @@ AMBIGUOUS = ("stiff-layer",)
 WHEEL = Wheel(radius=RADIUS, width=WIDTH)
 #: All answers that may be given a probability.
 CAUSES = (NONE, UNKNOWN, *(n for n, e in EFFECTS.items() if e.applies_to(WHEEL)))
-#: The seed was chosen before any entry was scored on its sets.
-SETS, SEED, QUICK_SETS = 24, 1, 3
+SETS = 24
 #: Smallest probability of a cause, since the logarithmic score of zero is infinite; fewest draws.
 LEAST_PROBABILITY, SUM_TOLERANCE, LEAST_DRAWS = 1e-4, 1e-4, 20
 #: Resamples of the sets, and the ends of the intervals.
 RESAMPLES, ENDS = 4000, (0.05, 0.95)
-CHANNELS = ("torque", "drawbar_pull", "sinkage")
-ABOUT = (
-    "Scores over blind sets, mean and 90 % interval by resampling of sets: the logarithm of the "
-    "probability of the right cause (higher is better; equal probabilities "
-    f"{-np.log(len(CAUSES)):.2f}), and the continuous ranked probability score of readings kept "
-    "back in units of the noise (lower is better). Differences are paired by set. `gp` is a "
-    "Gaussian process of slip, load and covariates, without physics. Both methods divide 5 % of "
-    "the probability equally among all causes, because they may be wrong themselves."
-)
 
 
 def plans(secret: str) -> Iterator[tuple[Plan, BlindSet]]:
-    """Sets of equally likely tiers that have one right answer."""
+    """Plans of the benchmark, of equally likely tiers that have one right answer."""
     number = 0
     while True:
         bits = hashlib.sha256(f"{secret} {number}".encode()).digest()[:16]
         number += 1
-        plan = draw_plan(TIERS, int.from_bytes(bits, "big"))
-        if plan.cause in AMBIGUOUS:
-            continue
+        seed = int.from_bytes(bits, "big")
+        of_tier = [
+            plan
+            for plan in benchmark_plans(seed)
+            if (plan.design, plan.tier) == ("sweep", TIERS[seed % len(TIERS)])
+            and plan.cause not in AMBIGUOUS
+        ]
+        plan = of_tier[seed // len(TIERS) % len(of_tier)]
         try:
             yield plan, draw_blind_set(plan)
         except RuntimeError:  # no soil of the family carries all rows
             continue
 
 
-def draw_plan(tiers: Sequence[str], seed: int) -> Plan:
-    """One plan at random, of the design `sweep`: every tier, cause and level is equally likely.
-
-    A smooth discrepancy of a random size is beside every mechanism, at least the smallest is in
-    tier D, and none where nothing is wrong with the model (tiers N).
-    """
-    generator = np.random.default_rng((seed, 3))
-
-    def one(levels: Sequence[Any]) -> Any:
-        return levels[int(generator.integers(len(levels)))]
-
-    tier = one(tiers)
-    cause = one(mechanism_keys(tier))
-    least = {"N": len(DISCREPANCIES), "D": 1}.get(tier[0], 0)
-    return Plan(
-        tier=tier,
-        cause=cause,
-        size=one(SIZES) if cause else 0.0,
-        noise=one(NOISE_LEVELS),
-        runs=one(RUNS),
-        soil_family=one(list(FAMILIES)),
-        free=one(FREE_COUNTS),
-        seed=seed,
-        discrepancy=one(DISCREPANCIES[least:] or (0.0,)),
-    )
-
-
 def digest(content: bytes) -> str:
     """SHA-256 in hexadecimal digits."""
     return hashlib.sha256(content).hexdigest()
-
-
-def cases(sample: Sample) -> list[Row]:
-    """The sets of a seed, numbered."""
-    count = QUICK_SETS if sample.quick else SETS
-    drawn = plans(digest(f"seed {sample.of((SEED,))[0]}".encode()))
-    return [asdict(plan) | {"number": i} for i, (plan, _) in zip(range(count), drawn, strict=False)]
-
-
-def entered(case: Row) -> list[Row]:
-    """Scores of each method, which is given the public files alone."""
-    plan = Plan(**{f.name: case[f.name] for f in fields(Plan)})
-    drawn = draw_blind_set(plan)
-    truth, found = truth_of(plan, drawn), []
-    with tempfile.TemporaryDirectory() as folder:
-        for name, text in public_files(drawn).items():
-            (Path(folder) / name).write_text(text, encoding="utf-8")
-        data = SetData.read(Path(folder), CAUSES)
-    for name, method in methods.METHODS.items():
-        answer = method(data, case["number"])
-        probabilities = stated(answer.causes, CAUSES)
-        found.append({"entry": name} | scores(probabilities, answer.draws, truth))
-    return found
 
 
 def public_files(drawn: BlindSet) -> dict[str, str]:
@@ -207,7 +143,11 @@ def interval(values: Sequence[float]) -> str:
 
 
 def tables(rows: list[Row]) -> str:
-    """Scores of each entry, and differences to the first one."""
+    """Scores of each entry and their 90 % intervals over sets, and differences to the first one.
+
+    The logarithm of the probability of the right cause is better the higher it is; the ranked score
+    of readings kept back, in units of the noise, the lower.
+    """
     names = ("causes, ln p", *CHANNELS)
     first = {r["number"]: r for r in rows if r["entry"] == rows[0]["entry"]}
     columns = {n: lambda own, n=n: interval([r[n] for r in own]) for n in names}
@@ -283,10 +223,6 @@ def checked(told: Mapping[str, Any], truth: Row, where: str) -> tuple[Any, Any]:
         )
     return p / p.sum(), np.stack(found, axis=-1)
 
-
-CHALLENGE = Bench(
-    "challenge", "The gap workflow beside a process", ABOUT, cases, entered, tables, long=True
-)
 
 if __name__ == "__main__":
     action, folder, sealed, *entries = sys.argv[1:]

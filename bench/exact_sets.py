@@ -26,31 +26,16 @@ MIN_EFFECTIVE_SAMPLES = 400.0
 
 #: Quantiles of a posterior: ends of the 90 % and of the 50 % interval.
 FRACTIONS = (0.05, 0.25, 0.75, 0.95)
-HPD_DRAWS = 200  # Posterior draws that estimate the HPD level of the truth
 
 
 @dataclass(frozen=True)
 class ExactPosterior:
-    r"""The posterior of one set, with the statistics of simulation-based calibration.
-
-    `log_density` is the logarithm of the posterior density at the truth, and `hpd_level` the share
-    of the posterior with a higher density than the truth; both are of all unknowns jointly, as
-    fractions of their priors, nuisance parameters included.
-
-    .. math:: \log p(\theta^* | y) = \log p(y | \theta^*) - \log \int p(y | \theta) d\theta
-
-    `rank` is the posterior probability (q,) of values below the truth: uniform over sets where the
-    posterior is exact (Cook, Gelman and Rubin, J. Computational and Graphical Statistics 15, 2006).
-    """
+    """The posterior of the estimated parameters of one set."""
 
     mean: Floats  # (q,)
     covariance: Floats  # (q, q)
     quantiles: Floats  # (4, q) at FRACTIONS
-    log_density: float
-    hpd_level: float
     flagged: bool  # whether sampling or its surrogate failed
-    rank: Floats
-    effective_samples: float
     log_evidence: float
 
 
@@ -93,25 +78,18 @@ class Unknowns:
 
 
 def sample_posterior(
-    unknowns: Unknowns, log_likelihood: Callable[[Floats], Floats], truth: Floats
+    unknowns: Unknowns, log_likelihood: Callable[[Floats], Floats]
 ) -> tuple[ExactPosterior, ImportanceSample]:
-    """The posterior under a log likelihood of coordinates (n, axes); `truth` are coordinates."""
+    """The posterior under a log likelihood of coordinates (n, axes)."""
     sample = importance_sample(lambda u: log_likelihood(unknowns.x(u)), unknowns.count)
     values = unknowns.values(unknowns.x(sample.u))
     mean = sample.mean(values)
     deviation = values - mean
-    draws = unknowns.x(sample.u[systematic_resampling(sample.weights, HPD_DRAWS, 0.5)])
-    log_density = log_likelihood(np.vstack([truth, draws]))
-    true_values = unknowns.values(truth[None])
     summary = ExactPosterior(
         mean=mean,
         covariance=(deviation.T * sample.weights) @ deviation,
         quantiles=sample.quantiles(values, np.asarray(FRACTIONS)),
-        log_density=float(log_density[0]) - sample.evidence,
-        hpd_level=float(np.mean(log_density[1:] > log_density[0])),
         flagged=sample.effective_size < MIN_EFFECTIVE_SAMPLES,
-        rank=sample.weights @ (values < true_values),
-        effective_samples=sample.effective_size,
         log_evidence=sample.evidence,
     )
     return summary, sample
@@ -152,7 +130,7 @@ def exact_set_posterior(family: WheelFamily, sets: SimulatedSets, index: int) ->
 
     surrogate = _fit_surrogate(unknowns, designs)
     likelihood = log_likelihood(sets, index, surrogate or physics)
-    summary, sample = sample_posterior(unknowns, likelihood, truth)
+    summary, sample = sample_posterior(unknowns, likelihood)
     if surrogate is None:
         return summary
     x = np.vstack(
@@ -275,4 +253,4 @@ def posterior_of_memory(
     def log_likelihood(x: Floats) -> Floats:
         return np.asarray(-0.5 * ((monomials(x, these) @ a.T) ** 2).sum(axis=1))
 
-    return sample_posterior(Unknowns.of(family, sets, index), log_likelihood, sets.x[index])[0]
+    return sample_posterior(Unknowns.of(family, sets, index), log_likelihood)[0]

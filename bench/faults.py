@@ -1,4 +1,4 @@
-"""Faults of readings: wrong units and wheels, sensor errors, unmodelled effects, mixed soils."""
+"""Faults of readings: wrong units and wheels, sensor errors, unmodelled effects."""
 
 from __future__ import annotations
 
@@ -30,14 +30,12 @@ EFFECT_CONDITIONS = {"speed": 0.2, "pass_number": 2.0, "slip_angle": 0.2}
 class Fault:
     """A difference between the model of an estimator and reality, or the readings of it.
 
-    `report` maps true readings to reported ones; `case` maps the nominal case to the true one;
-    `mix_rows` combines the rows of a set with those of another set, both (sets, rows).
+    `report` maps true readings to reported ones; `case` maps the nominal case to the true one.
     """
 
     name: str
     report: Report = field(default=lambda r: r)
     case: Callable[[Case], Case] = field(default=lambda case: case)
-    mix_rows: Callable[[Readings, Readings], Readings] = field(default=lambda own, other: own)
 
 
 def _scaled(name: str, factor: float) -> Report:
@@ -46,16 +44,6 @@ def _scaled(name: str, factor: float) -> Report:
 
 def _shifted(name: str, offset: float) -> Report:
     return lambda r: r | {name: r[name] + offset}
-
-
-def _first_torque_doubled(own: Readings, other: Readings) -> Readings:
-    first = np.arange(own["torque"].shape[-1]) == 0
-    return own | {"torque": np.where(first, 2.0, 1.0) * own["torque"]}
-
-
-def _half_of_another_soil(own: Readings, other: Readings) -> Readings:
-    count = own["torque"].shape[-1]
-    return {k: np.where(np.arange(count) < count // 2, v, other[k]) for k, v in own.items()}
 
 
 def _with_wheel(key: str, factor: float) -> Callable[[Case], Case]:
@@ -135,23 +123,9 @@ def definitions() -> list[Fault]:
     ]
 
 
-def mixed_rows() -> list[Fault]:
-    """Sets whose rows are not all readings of one soil."""
-    return [
-        Fault(
-            "two soils, half of the rows each",
-            mix_rows=_half_of_another_soil,
-        ),
-        Fault(
-            "torque of one row doubled",
-            mix_rows=_first_torque_doubled,
-        ),
-    ]
-
-
 def faults(case: Case) -> list[Fault]:
     """All faults of the study."""
-    return units() + wheels() + sensors() + effects(case) + mixed_rows()
+    return units() + wheels() + sensors() + effects(case)
 
 
 def simulate(case: Case, theta: Floats, slip: Floats, load: Floats) -> Readings:
@@ -185,10 +159,6 @@ def shuffled_conditions(sets: int, seed: int) -> Order:
     return (6 * slips + chosen).reshape(sets, 36)
 
 
-def select_rows(r: Readings, fault: Fault, order: Order) -> Readings:
-    """Rows (sets, rows) in this order, with the fault's mixing of rows."""
-    own, other = (
-        {k: np.take_along_axis(v, order, axis=1) for k, v in source.items()}
-        for source in (r, {k: np.roll(v, 1, axis=0) for k, v in r.items()})
-    )
-    return fault.mix_rows(own, other)
+def select_rows(r: Readings, order: Order) -> Readings:
+    """Rows (sets, rows) in this order."""
+    return {k: np.take_along_axis(v, order, axis=1) for k, v in r.items()}

@@ -89,7 +89,7 @@ def read(case: Row, estimator: Estimator) -> tuple[Readings, Floats]:
     truth = np.stack([model.prior[key].at(rng.random(sets)) for key in SHEAR], axis=1)
     order = shuffled_conditions(sets, SEED)[:, :ROWS]
     true = simulate(fault.case(model), truth, SLIP, LOAD)
-    found = select_rows(fault.report(add_noise(true, model, SEED)), fault, order)
+    found = select_rows(fault.report(add_noise(true, model, SEED)), order)
     if name == USUAL_SENSORS:
         found = with_usual_sensor_errors(found, estimator, SEED)
     return found, truth

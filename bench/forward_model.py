@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -26,10 +26,9 @@ from soilml import (
     Model,
     Operating,
     SlipSinkage,
-    Soil,
     Wheel,
     identify,
-    read_table,
+    simulate,
     soil,
 )
 from soilml.config.case import Case
@@ -37,6 +36,9 @@ from soilml.gap import gap
 from soilml.io.table import Table
 from soilml.processes import usable_cores
 from soilml.systems.tracked_robot.robot import WANG2018
+from training.dataset import read_dataset
+from training.spec import read_spec
+from training.train import train
 
 #: Operating points of a call, of the input box, and of the scalar loop; runs of each.
 ROWS, BOX_ROWS, BASELINE_ROWS, REPEATS = 200_000, 16_384, 40, 3
@@ -49,7 +51,8 @@ t = time.perf_counter() - t
 status = dict(line.split(":", 1) for line in open("/proc/self/status"))
 print(t, int(status["VmRSS"].split()[0]) / 1024)
 """
-READINGS = 64  # Rows that commands analyse
+READINGS, MANY_READINGS = 64, 208  # Rows that commands analyse
+TRAINED = 96_000  # Rows that training learns from, those of the demonstration
 ABOUT_ACCURACY = (
     "Relative error against adaptive quadrature and bracketing (`tests/reference.py`). Goal: 1e-6. "
     "The input box is c 0 to 6 kPa, phi 15 to 50 deg, K 2 to 60 mm, n 0.4 to 1.6 and k 4e4 to 1e7 "
@@ -101,12 +104,6 @@ def accuracy_table(rows: list[Row]) -> str:
     return table(rows, {"slip": "slip"}, columns)
 
 
-def rows_of(ground: Soil, part: slice) -> Soil:
-    """Some rows of a soil whose parameters are arrays or numbers."""
-    arrays = {k: v[part] for k, v in vars(ground).items() if np.ndim(v) and len(v) > 1}
-    return replace(ground, **arrays)
-
-
 def speed(case: Row) -> list[Row]:
     """Solutions per second, beside scalar quadrature."""
     rows, rng = ROWS // 50 if case["quick"] else ROWS, np.random.default_rng(0)
@@ -119,14 +116,7 @@ def speed(case: Row) -> list[Row]:
     load, slip = rng.uniform(30.0, 120.0, rows), rng.uniform(0.05, 0.6, rows)
     wheel, box = Model(Wheel(radius=0.15, width=0.12)), input_box(BOX_ROWS, seed=123)
     box["slip"] = np.abs(box["slip"])
-    first = slice(BASELINE_ROWS)
-    columns = vars(rows_of(sand, first)) | {"radius": 0.15, "width": 0.12}
-    columns |= {"slip": slip[first], "load": load[first]}
-
-    def in_calls() -> None:
-        for start in range(0, rows // 4, 1000):
-            part = slice(start, start + 1000)
-            wheel(rows_of(sand, part), Operating(slip=slip[part], load=load[part]))
+    columns = vars(sand) | {"radius": 0.15, "width": 0.12, "slip": slip, "load": load}
 
     def row_by_row() -> None:
         for i in range(BASELINE_ROWS):
@@ -140,7 +130,6 @@ def speed(case: Row) -> list[Row]:
     calls: dict[str, tuple[Callable[[], object], int]] = {
         "adaptive quadrature and bracketing, row by row (scipy)": (row_by_row, BASELINE_ROWS),
         "rigid wheel, driving": (by(wheel), rows),
-        "the same, in calls of 1000 rows": (in_calls, rows // 4),
         "the same, over the whole input box of the accuracy table, with rows that are too heavy": (
             lambda: solved(box), BOX_ROWS,
         ),
@@ -203,20 +192,14 @@ def _first_estimate() -> str:
 
 
 @cache
-def measured_rows() -> tuple[Case, Table]:
+def measured_rows(count: int = READINGS) -> tuple[Case, Table]:
     """The case of the recipe `wheel`, and readings of torque and sinkage on one soil."""
     case, rng = read_recipe("wheel").case, np.random.default_rng(1)
-    slip, load = rng.uniform(0.05, 0.6, READINGS), np.repeat([35.0, 60.0, 85.0, 110.0], 16)
+    slip, load = rng.uniform(0.05, 0.6, count), np.repeat([35.0, 60.0, 85.0, 110.0], count // 4)
     true = case.with_values({"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012})
-    force = true.model(true.soil, Operating(slip=slip, load=load))
-    torque = force.torque * (1.0 + 0.02 * rng.standard_normal(READINGS))
-    sinkage = force.sinkage + 0.0005 * rng.standard_normal(READINGS)
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "runs.csv"
-        rows = zip(load, slip, load, torque, sinkage, strict=True)
-        lines = [f"{run:g},{s},{w},{t},{z}" for run, s, w, t, z in rows]
-        file.write_text("\n".join(["run,slip,load_N,torque_Nm,sinkage_m", *lines]))
-        return case, read_table(file)
+    rows = simulate(true, slip, load, seed=1)
+    kept = ("slip", "load_N", "torque_Nm", "sinkage_m")
+    return case, Table({"run": load} | {name: rows[name] for name in kept})
 
 
 def _identified(method: str) -> str:
@@ -224,19 +207,34 @@ def _identified(method: str) -> str:
     return f"{1e3 * seconds_of(lambda: identify(case, rows, method=method), 3):.0f} ms"
 
 
-def _gap() -> str:
-    case, rows = measured_rows()
+def _gap(count: int = READINGS) -> str:
+    case, rows = measured_rows(count)
     return f"{seconds_of(lambda: gap(case, rows), 2):.1f} s"
+
+
+def _training() -> str:
+    """Wall and processor time, that of worker processes included."""
+    spec = read_spec("fused")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "data.parquet"
+        generate(read_recipe("wheel").sized(TRAINED), file)
+        begun, began = time.perf_counter(), os.times()
+        train(spec, read_dataset(file, spec.features, spec.targets))
+        spent, ended = time.perf_counter() - begun, os.times()
+    return f"{spent:.0f} s, {sum(ended[:4]) - sum(began[:4]):.0f} s of processors"
 
 
 #: Commands and calls: goal, and the measurement in words.
 CALLS: dict[str, tuple[str, Callable[[], str]]] = {
     "`soilml generate wheel`, a file": ("", _generation),
+    f"`soilml train fused`, {TRAINED:,} rows": ("30 s", _training),
     "`soilml --help`": ("0.15 s", lambda: _start("--help")),
     "an error of usage": ("0.15 s", lambda: _start("estimate", "--nonsense")),
     "`identify` 64 rows, nonlinear least squares": ("50 ms", lambda: _identified("nonlinear")),
     "`identify` 64 rows, posterior": ("1000 ms", lambda: _identified("posterior")),
+    "`identify` 64 rows, averaged": ("1000 ms", lambda: _identified("averaged")),
     "`gap` 64 rows of 2 channels, nothing hidden": ("1 s", _gap),
+    "`gap` 208 rows of 2 channels, nothing hidden": ("3 s", lambda: _gap(MANY_READINGS)),
     "from import to the first estimate": ("0.2 s", _first_estimate),
     "one reading on board, onnxruntime, `wheel.onnx`": ("60 us", board.one_reading),
     "set of 16 on board, onnxruntime, `wheel.onnx`": ("", lambda: board.set_of_16("wheel")),

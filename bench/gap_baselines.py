@@ -69,7 +69,15 @@ def process_of(
 
 
 def predicted(case: Case, rows: Table) -> dict[str, np.ndarray]:
-    """Predictions (rows,) of each channel, with the mean of the remainder."""
+    """Predictions (rows,) of each channel, with the mean of the remainder; each gear's own rows."""
+    if "gear" in rows:
+        found = {name: np.full(len(rows), np.nan) for name in CHANNELS}
+        plain = Table({name: v for name, v in rows.columns.items() if name != "gear"})
+        for gear in case.gears:
+            own = rows["gear"] == gear
+            for name, values in predicted(case.of_gear(gear), plain.rows(own)).items():
+                found[name][own] = values
+        return found
     force = forces(case, operating_points(rows))
     return {name: np.asarray(getattr(force, name)) for name in CHANNELS}
 

@@ -10,7 +10,7 @@ import gap_figures as gf
 import gap_reliability
 import numpy as np
 from core_speed import SOLVES
-from gap_figures import Judged, first, holds, nameable, rate, unique
+from gap_figures import Judged, rate
 from runner import markdown, table
 
 from datagen.blind_sets.run_schedules import DESIGNS
@@ -59,24 +59,13 @@ ENLARGED = (
     "rows of further ones, were drawn at random, with an SNR of 3 or more before any analysis. "
     "They count in the gates of these four groups at SNR >= 3 alone."
 )
-#: What predicts rows held out, as records have it and as tables do; and the rows.
-METHODS = {
-    "soil": "soil alone",
-    "named": "returned model",
-    "Gaussian process": "soil + process",
-    "process of readings": "process alone",
-}
-PARTS = {
-    "between": "Rows of the same runs at other slips",
-    "region": "Rows at 1.3 to 1.6 times the heaviest load",
-}
 
 
 def tables(every: Sequence[Judged]) -> str:
     """All sections."""
     sets = gf.sampled(every)
-    parts = [_head(every, sets), _gates(every), _statuses(sets), _held_out(sets), _families(sets)]
-    return "\n\n".join(part for part in (*parts, _reliability(sets)) if part)
+    parts = (_head(every, sets), _gates(every), _statuses(sets), _reliability(sets))
+    return "\n\n".join(part for part in parts if part)
 
 
 def _head(every: Sequence[Judged], sets: Sequence[Judged]) -> str:
@@ -100,93 +89,14 @@ def _gates(sets: Sequence[Judged]) -> str:
     )
 
 
-def of_unique(own: Sequence[Judged]) -> str:
-    """How often a unique explanation is the truth."""
-    alone = [s for s in own if unique(s)]
-    return rate(sum(map(first, alone)), len(alone))
-
-
-def size_of_set(own: Sequence[Judged]) -> str:
-    """Mean number of explanations of a cause set."""
-    size = [len(s["cause_set"]) for s in own if s.get("cause_set")]
-    return f"{np.mean(size):.2f}" if size else "-"
-
-
-def _counts(sets: Sequence[Judged], label: str, member: str) -> str:
-    """How often each status was given in each group."""
+def _statuses(sets: Sequence[Judged]) -> str:
+    """How often each status was given in each tier."""
     found = Counter(s["status"] for s in sets)
     statuses = [*[x for x in STATUSES if x in found], *sorted(found.keys() - set(STATUSES))]
     columns = {"sets": lambda own: len(own)}
     columns |= {x: lambda own, x=x: sum(s["status"] == x for s in own) for x in statuses}
-    return table(sets, {label: member}, columns)
-
-
-def _by_level(sets: Sequence[Judged]) -> list[Judged]:
-    ordered = sorted(sets, key=lambda s: s["discrepancy"])
-    return [s | {"level": f"{s['discrepancy']:.0%}"} for s in ordered]
-
-
-def _statuses(sets: Sequence[Judged]) -> str:
-    own = _by_level([s for s in gf.named_designs(sets) if nameable(s)])
-
-    def contains(of: Sequence[Judged]) -> str:
-        return rate(sum(map(holds, of)), len(of))
-
-    columns = {"cause set contains the cause": contains, "right when unique": of_unique}
-    alone = _by_level([s for s in sets if s["tier"] == "D"])
-    return "\n\n".join(
-        [
-            "## What was said where a cause can be named\n\nCauses of the catalogue with a "
-            "separating SNR of 3 or more, at several loads, by discrepancy.",
-            _counts(own, "discrepancy", "level"),
-            table(own, {"discrepancy": "level"}, columns | {"its size": size_of_set}),
-            "What was said of a discrepancy alone (tier D).",
-            _counts(alone, "discrepancy", "level"),
-            "## What was said, by tier",
-            _counts(sorted(sets, key=lambda s: s["tier"]), "tier", "tier"),
-        ]
-    )
-
-
-def _held_out(sets: Sequence[Judged]) -> str:
-    """Median distance to the truth, by status and method."""
-    parts = []
-    for part, words in PARTS.items():
-        own = [s for s in sets if METHODS.keys() <= s.get(part, {}).keys()]
-        columns = {"sets": lambda rows: len(rows)} | {
-            title: lambda rows, m=m, part=part: f"{np.median([s[part][m] for s in rows]):.2f}"
-            for m, title in METHODS.items()
-        }
-        if own:
-            own = [s | {"said": f"`{s['status']}`"} for s in own]
-            parts.append(f"{words}:\n\n{table(own, {'status': 'said'}, columns, 'all')}")
-    head = (
-        "## Held-out rows, whatever was said\n\nRMS distance to the noise-free readings, in "
-        "standard deviations of the noise: median over the sets of a status. *Soil + process* is a "
-        "Gaussian process of what the soil alone leaves; *process alone* knows no physics."
-    )
-    return "\n\n".join([head, *parts]) if parts else ""
-
-
-def _families(sets: Sequence[Judged]) -> str:
-    """What was said of each law and each change."""
-    own = [s for name in "LT" for s in sorted(gf.tier(sets, name), key=lambda s: s["cause"])]
-
-    def of_clear(clear, own):  # type: ignore[no-untyped-def]
-        seen = [s for s in own if clear(s)]
-        return rate(sum(map(gf.related, seen)), len(seen))
-
-    columns = {
-        "sets": lambda own: len(own),
-        "first, SNR >= 3": lambda own: of_clear(lambda s: s["snr"] >= gf.NAMEABLE_SIGMA, own),
-        "first, signature of 6 sigma": lambda own: of_clear(gf.visible, own),
-        "falsely unique": lambda own: sum(map(gf.falsely_unique, own)),
-    }
-    head = (
-        "## Other laws, and soils that change\n\nThe likeliest explanation is the law or another "
-        "of its family, or a drift of what changes in the soil."
-    )
-    return f"{head}\n\n{table(own, {'hidden': 'cause'}, columns)}" if own else ""
+    ordered = sorted(sets, key=lambda s: s["tier"])
+    return f"## What was said, by tier\n\n{table(ordered, {'tier': 'tier'}, columns)}"
 
 
 def _reliability(sets: Sequence[Judged]) -> str:

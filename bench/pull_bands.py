@@ -10,15 +10,14 @@ import numpy as np
 from runner import ROOT, Bench, Row, Sample, each, percent, table
 from scipy.stats import binom
 
-from soilml import Estimator, SlipSinkage, read_case
+from soilml import SlipSinkage, read_case
 from soilml.config.case import Case
 from soilml.io.table import Table
 from soilml.numerics.quantiles import QUANTILES, quantile_band
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
+from soilml.traction import DrivenVehicle, performance, pull_report
 from soilml.traction.draws import SoilDraws
-from soilml.traction.pull_and_slope import predict_traction
-from soilml.traction.report import pull_report
 
 #: Soils that nothing was settled with; a load among those driven, and one that is not (N).
 SEEDS, LOADS = range(20_000, 20_030), (75.0, 200.0)
@@ -26,8 +25,8 @@ SEEDS, LOADS = range(20_000, 20_030), (75.0, 200.0)
 SLIPS = (0.1, 0.3, 0.6)
 ROWS, DRIVEN_LOADS = 6, (30.0, 120.0)
 #: Who answers, and in which world.
-DEFAULT, EXACT, FILE, LACKING = "default", "--exact-model", "--from wheel", ", slip-sinkage missing"
-KINDS = (DEFAULT, EXACT, FILE, DEFAULT + LACKING, EXACT + LACKING)
+DEFAULT, EXACT, LACKING = "default", "--exact-model", ", slip-sinkage missing"
+KINDS = (DEFAULT, EXACT, DEFAULT + LACKING, EXACT + LACKING)
 ABOUT = (
     "Coverage of 90 % bands of drawbar pull and of the steepest slope (docs/how-to/pull.md), over "
     f"{len(SEEDS)} simulated soils: 95 of 100 exact bands show "
@@ -44,17 +43,17 @@ def cases(sample: Sample) -> list[Row]:
 
 
 @cache
-def known() -> tuple[Case, Case, Estimator]:
-    """The assumed case, the world with an effect that it lacks, and the trained file."""
+def known() -> tuple[Case, Case]:
+    """The assumed case, and the world with an effect that it lacks."""
     case = read_case(ROOT / "examples/wheel/model.toml")
     digging = SlipSinkage(n1=SlipSinkage.about.reference["n1"])
     lacking = replace(case, model=case.model + digging)
-    return case, lacking, Estimator.load(ROOT / "exported/wheel.onnx")
+    return case, lacking
 
 
 def one_soil(asked: Row) -> list[Row]:
     """Bands of a soil of the prior under each load, beside the truth of its world."""
-    case, lacking, file = known()
+    case, lacking = known()
     by = asked["by"]
     world = lacking if by.endswith(LACKING) else case
     rng = np.random.default_rng(asked["seed"])
@@ -65,14 +64,14 @@ def one_soil(asked: Row) -> list[Row]:
         simulated_rows(case, world, true, rng),
         loads=LOADS,
         slip_limit=SLIPS[-1],
-        estimator=file if by == FILE else None,
         exact_model=by.startswith(EXACT),
     )
     rows = []
     for load, found in zip(LOADS, report.by_load, strict=True):
         band = found.posterior
-        shown = [int(np.argmin(np.abs(band.slip - s))) for s in SLIPS]
-        real = predict_traction(world, true, load, band.slip)
+        shown = [int(np.argmin(np.abs(band.curve_slip - s))) for s in SLIPS]
+        wheel = DrivenVehicle.of_wheel(world, load)
+        real = performance(wheel, true, np.zeros(0), band.curve_slip)
         slope = quantile_band(band.steepest_slope)
         rows.append(
             {

@@ -35,7 +35,7 @@ CANDIDATES = 3
 HASHED_DIGITS = 5
 #: The exact posteriors of the reference sets, and what of them is stored.
 STORED = Path(__file__).with_name("sets_limit.npz")
-FIGURES = ("mean", "covariance", "quantiles", "log_density", "hpd_level", "flagged")
+FIGURES = ("mean", "covariance", "quantiles", "flagged")
 #: Labels of the two families; they are part of the stored design keys.
 ONE_WHEEL, ANY_WHEEL = "reference wheel", "any wheel"
 

@@ -11,7 +11,6 @@ sys.path[:0] = [str(ROOT / folder) for folder in ("bench", "tests")]
 #: Modules that declare benches, in the order in which they run.
 MODULES = (
     "forward_model",
-    "training_bench",
     "peers",
     "sets",
     "faults_on_board",
@@ -24,9 +23,6 @@ MODULES = (
     "pull_bands",
     "adapt",
     "gap_bench",
-    "gap_pull",
-    "gap_speed",
-    "challenge",
 )
 
 if __name__ == "__main__":

@@ -153,11 +153,6 @@ class _Soil:
         return np.asarray(self._solve(slip.ravel(), load.ravel()).torque.reshape(slip.shape))
 
 
-def ground_forces(soil: dict[str, float]) -> Any:
-    """Pull and torque on a soil, as functions of slip and load."""
-    return _Soil(soil)
-
-
 class _Floor:
     """Forces on a hard floor: friction that rises with slip, and rolling resistance."""
 

@@ -1,28 +1,24 @@
 """Slip of a rover without odometry, on simulated drives.
 
-Fixed numbers of the filter were chosen on drives of the seeds `TUNED`, the tables are of others.
+Fixed numbers of the filter were chosen on drives of other seeds.
 """
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
-from runner import ROOT, Bench, Row, Sample, markdown, rms
-from slip_drives import RADIUS, Drive, loads, simulate_drive
+from runner import ROOT, Bench, Row, Sample, percent, rms, table
+from slip_drives import Drive, loads, simulate_drive
 
 from soilml import read_case
 from soilml.slip_filter.filter import SlipFilter
 from soilml.slip_filter.force_table import ForceTable, force_table
-from soilml.traction.draws import SoilDraws
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
-TUNED, TESTED = range(100, 107), range(500, 508)
-KNOWN = 256  # Grounds of the filter that knows the soil: one soil, and as many errors of the pull
-Z_90 = 1.645
+TESTED = range(500, 508)
 LOADS = (20.0, 140.0)  # N, of the table
 NO_SOIL = 0.5  # Probability of a hard floor from which on a row is refused
 SETTLED = 10  # Rows after a change from which a soil counts as found
@@ -34,19 +30,14 @@ WORLDS: dict[str, dict[str, Any]] = {
     "the same with slip-sinkage 0.3": {"apart": 0.1, "mechanism": "slip-sinkage", "size": 0.3},
     FLOOR: {"floor": True},
 }
-METHODS = ("filter", "known soil", "line")
-#: Bands of the slip of the first wheel.
-BANDS = ((-1.0, 0.1), (0.1, 0.3), (0.3, 1.0))
+#: Ends of bands of the slip of the first wheel.
+BANDS = (0.1, 0.3)
 ABOUT = (
     f"Drives of docs/how-to/drive.md, {len(TESTED)} a line, by the reference wheel of "
     "`datagen/blind_sets`: three soils of 60 rows each, on slopes of -11 to 20 degrees. "
     "Friction and gain of each drive and the zero of the pitch are drawn for each drive. Each "
-    "cell: rmse of the slip of a wheel, coverage of its 90 % interval, its median width. *Filter*: "
-    "`soilml drive slip`, which knows the prior alone. *Known soil*: the same filter with "
-    "the true soil and its begin; with slip-sinkage it knows the soil, and not the mechanism. "
-    "*Line*: slip as a straight line of torque over radius and load, fitted to drives whose "
-    "slip is known. *Refused*: rows that were called a hard floor. Numbers of the filter were "
-    "chosen on other seeds."
+    "line: rmse of the slip of a wheel, coverage of its 90 % interval, its median width. The "
+    "filter knows the prior of the soil alone. *Refused*: rows that were called a hard floor."
 )
 
 
@@ -70,18 +61,17 @@ def prior_table() -> ForceTable:
 def one_drive(case: Row) -> list[Row]:
     """Rows of a drive: errors and intervals of the slip of each wheel by each method."""
     drive = simulate_drive(case["seed"], **WORLDS[case["world"]])
-    own, floor = filtered(drive, prior_table())
-    answers = [own] if case["world"] == FLOOR else [own, known(drive), by_line(drive)]
+    found, floor = filtered(drive, prior_table())
     return [
         {
             "row": i,
             "true": true[0],
-            "floor": floor[i],
-            "error": [each[i, 1] - true for each in answers],
-            "held": [(each[i, 0] <= true) & (true <= each[i, 2]) for each in answers],
-            "width": [each[i, 2] - each[i, 0] for each in answers],
+            "floor": floor[i] > NO_SOIL,
+            "error": middle - true,
+            "held": (low <= true) & (true <= high),
+            "width": high - low,
         }
-        for i, true in enumerate(drive.slip)
+        for i, (true, (low, middle, high)) in enumerate(zip(drive.slip, found, strict=True))
     ]
 
 
@@ -97,69 +87,28 @@ def filtered(drive: Drive, table: ForceTable) -> tuple[Floats, Floats]:
     return np.asarray(found), np.asarray(floor)
 
 
-def known(drive: Drive) -> Floats:
-    """The same where each soil and its begin are known."""
-    parts = []
-    for number, soil in enumerate(drive.soils):
-        of_rows = [f.name for f in fields(Drive) if f.name != "soils"]
-        own = {name: getattr(drive, name)[drive.ground == number] for name in of_rows}
-        names = tuple(rover().prior)
-        values = np.tile([soil[name] for name in names], (KNOWN, 1))
-        table = force_table(rover(), LOADS, soils=SoilDraws(names, values))
-        parts.append(filtered(replace(drive, **own), table)[0])
-    return np.concatenate(parts)
-
-
-def pull_share(drive: Drive) -> Floats:
-    """Torque over radius and load of each wheel, (rows, wheels)."""
-    return drive.torque / (RADIUS * loads(drive.slope))
-
-
-@cache
-def linear_law() -> tuple[Floats, float]:
-    """Slip as a straight line of torque over radius and load, and the standard error."""
-    drives = [simulate_drive(seed) for seed in TUNED]
-    x, y = (np.concatenate([f(d).ravel() for d in drives]) for f in (pull_share, lambda d: d.slip))
-    line = np.polyfit(x, y, 1)
-    return line, float(np.std(y - np.polyval(line, x)))
-
-
-def by_line(drive: Drive) -> Floats:
-    """Slip by that law."""
-    line, std = linear_law()
-    middle = np.polyval(line, pull_share(drive))
-    return np.stack([middle - Z_90 * std, middle, middle + Z_90 * std], axis=1)
-
-
-def cells(rows: list[Row]) -> list[str]:
-    """Rmse, coverage of the 90 % interval and its median width, by each method."""
-    error, held, width = (np.asarray([r[k] for r in rows]) for k in ("error", "held", "width"))
-    found = []
-    for k in range(len(METHODS)):
-        found += [f"{rms(error[:, k]):.3f}", f"{100 * held[:, k].mean():.0f} %"]
-        found.append(f"{np.median(width[:, k]):.2f}")
-    return found
-
-
 def tables(rows: list[Row]) -> str:
     """A line for each world, and for bands of slip in it; rows that are refused."""
-    lines = []
-    for name in WORLDS:
-        own = [r for r in rows if r["world"] == name]
-        if name == FLOOR or not own:
-            continue
-        refused = np.mean([r["floor"] > NO_SOIL for r in own])
-        lines.append((name, len(own), *cells(own), f"{100 * refused:.1f} %"))
-        for low, high in BANDS:
-            some = [r for r in own if low <= r["true"] < high]
-            lines.append((f"- slip {low:g} to {high:g}", len(some), *cells(some), ""))
-    head = [f"{n}: {what}" for n in METHODS for what in ("rmse", "covered", "width")]
+    columns = {
+        "rows": len,
+        "filter: rmse": lambda own: f"{rms([r['error'] for r in own]):.3f}",
+        "filter: covered": lambda own: f"{100 * np.mean([r['held'] for r in own]):.0f} %",
+        "filter: width": lambda own: f"{np.median([r['width'] for r in own]):.2f}",
+        "refused": percent("floor", 1),
+    }
+    driven = [r for r in rows if r["world"] != FLOOR]
+    ends = [-1.0, *BANDS, 1.0]
+    for row in driven:
+        band = np.searchsorted(BANDS, row["true"], side="right")
+        row["band"] = f"{ends[band]:g} to {ends[band + 1]:g}"
+    driven.sort(key=lambda row: (list(WORLDS).index(row["world"]), row["band"]))
     floor = [r for r in rows if r["world"] == FLOOR]
-    after = [r["floor"] > NO_SOIL for r in floor if r["row"] >= SETTLED]
+    after = [r["floor"] for r in floor if r["row"] >= SETTLED]
     drives = len({r["seed"] for r in floor})
     return (
-        f"{markdown(('drives', 'rows', *head, 'refused'), lines)}\n\nHard floor: {drives} drives; "
-        f"refused {100 * np.mean(after):.0f} % of the rows from the {SETTLED}th on."
+        f"{table(driven, {'drives': 'world'}, columns)}\n\n"
+        f"{table(driven, {'drives': 'world', 'slip': 'band'}, columns)}\n\nHard floor: {drives} "
+        f"drives; refused {100 * np.mean(after):.0f} % of the rows from the {SETTLED}th on."
     )
 
 

@@ -1,4 +1,4 @@
-"""Simulated days of driving: the tracker beside plain steps."""
+"""Simulated days of driving, which the tracker follows."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from runner import ROOT, Bench, Row, Sample, table
 from soilml import Estimator, SoilTracker
 from soilml.onboard.tracking import Event
 
-#: Days of each line, and of the table of many days, and the first seed. Limits of the tracker were
-#: chosen on days of other seeds.
-DAYS, MANY_DAYS, SEED = 12, 100, 100
+#: Days of each line, and the first seed. Limits of the tracker were chosen on days of other seeds.
+DAYS, SEED = 12, 100
 #: Rows after a change from which the soil counts as steady.
 SETTLED = 20
 #: A soil that changed is found if the tracker says so within so many rows.
@@ -29,15 +28,10 @@ WORLDS = {
     "grousers of 10 mm": ("grousers", 0.01, 0.0),
     "all typical errors": ("", 0.0, 1.0),
 }
-#: Those of the table of many days: a right model, and errors as the averaged answer expects them.
-LONG_WORLDS = ("as modelled", "all typical errors")
-#: Answers: whether the tracker gives them, and what the file is told of errors of its model.
-AVERAGED = "tracker, averaged"
-ANSWERS: dict[str, tuple[bool, dict[str, float]]] = {
-    "tracker, `model_error` 0": (True, {"model_error": 0.0}),
-    AVERAGED: (True, {}),
-    "`step`, `model_error` 0": (False, {"model_error": 0.0}),
-    "`step`, averaged": (False, {}),
+#: Answers, and what the file is told of errors of its model.
+ANSWERS: dict[str, dict[str, float]] = {
+    "tracker, `model_error` 0": {"model_error": 0.0},
+    "tracker, averaged": {},
 }
 #: Deviation in standard deviations of a soil that the estimate is wrong about.
 FAR = 3.0
@@ -66,21 +60,14 @@ def cases(sample: Sample) -> list[Row]:
     return [{"world": w, "answer": a, "seed": s} for w in WORLDS for a in ANSWERS for s in days]
 
 
-def many(sample: Sample) -> list[Row]:
-    """More days, with the averaged answer."""
-    days = sample.of(range(SEED, SEED + MANY_DAYS), 2)
-    return [{"world": w, "answer": AVERAGED, "seed": s} for w in LONG_WORLDS for s in days]
-
-
 def one_day(case: Row) -> Row:
     """What happened on a day."""
     mechanism, size, errors = WORLDS[case["world"]]
     drift = ("friction", "zero")[case["seed"] % 2]
     day = simulate_day(case["seed"], drift, mechanism, size, errors)
-    tracks, told = ANSWERS[case["answer"]]
     noise = {"slip": (SLIP_STD, 0.0), "torque": (0.0, TORQUE_NOISE)}
-    estimator = Estimator.load(ROOT / "exported" / "wheel.onnx").on(noise=noise, **told)
-    return tracked(estimator, day) if tracks else stepped(estimator, day)
+    file = Estimator.load(ROOT / "exported" / "wheel.onnx")
+    return tracked(file.on(noise=noise, **ANSWERS[case["answer"]]), day)
 
 
 def tracked(estimator: Estimator, day: Day) -> Row:
@@ -121,19 +108,6 @@ def tracked(estimator: Estimator, day: Day) -> Row:
     }
 
 
-def stepped(estimator: Estimator, day: Day) -> Row:
-    """The same day with `Estimator.step`, whose only alarm is `in_range`."""
-    memory, estimates = estimator.start(), []
-    for i in range(len(day.kinds)):
-        found, memory = estimator.step(memory, **day.row(i))
-        estimates.append(found)
-    flags = [not found.in_range for found in estimates]
-    return steady(day, estimates, [True] * len(flags)) | {
-        "alarms": flags[: day.changes[0][0]],
-        "far": far_rows(day, estimates, flags),
-    }
-
-
 def delay(begin: int, told: Sequence[int]) -> float | None:
     """Rows from a begin to the first that tells of it; None if none does."""
     return next((i - begin + 1.0 for i in told if i >= begin), None)
@@ -170,7 +144,7 @@ def far_rows(day: Day, estimates: Sequence[Any], flags: Sequence[bool]) -> list[
 
 def joined(rows: list[Row], member: str) -> list[Any]:
     """Lists of all days as one."""
-    return [value for row in rows for value in row.get(member, ())]
+    return [value for row in rows for value in row[member]]
 
 
 def all_days(member: str, form: str, of: Any = np.mean, scale: float = 1.0):  # type: ignore[no-untyped-def]
@@ -203,13 +177,13 @@ def tables(rows: list[Row]) -> str:
     for name, (low, high) in zip(SIZES, pairwise(ends), strict=True):
         columns[f"change {name}"] = lambda own, low=low, high=high: delays(
             [rows for size, rows in joined(own, "delays") if low <= size < high]
-        ) if "delays" in own[0] else "-"  # fmt: skip
+        )
     columns |= {
         "glitches set aside": all_days("glitches", ".0%"),
         "torque stuck": all_days("stuck", ".0%"),
-        "slip stuck, rows used": lambda own: max(r.get("slip_stuck", "-") for r in own),
+        "slip stuck, rows used": lambda own: max(r["slip_stuck"] for r in own),
         "pause": all_days("paused", ".0%"),
-        "drift": lambda own: delays([r["drift"] for r in own if "drift" in r]),
+        "drift": lambda own: delays([r["drift"] for r in own]),
         f"flagged beyond {FAR:g} std": lambda own: (
             f"{all_days('far', '.0%')(own)} of {len(joined(own, 'far'))}"
         ),
@@ -217,36 +191,4 @@ def tables(rows: list[Row]) -> str:
     return table(rows, {"world": "world", "answer": "answer"}, columns)
 
 
-def tables_of_many(rows: list[Row]) -> str:
-    """Coverage and flags of the averaged answer, with standard errors over days."""
-
-    def covered(k: int):  # type: ignore[no-untyped-def]
-        def cell(own: list[Row]) -> str:
-            shares = 100 * np.asarray([np.mean(row["covered"], axis=0)[k] for row in own])
-            error = shares.std(ddof=len(own) > 1) / np.sqrt(len(own))
-            return f"{shares.mean():.1f} ± {error:.1f}"
-
-        return cell
-
-    columns = {"days": len} | {name: covered(k) for k, name in enumerate(("c", "phi", "K"))}
-    columns |= {
-        "in range": all_days("answered", ".1f", scale=100.0),
-        "alarms": all_days("alarms", ".1f", scale=1000.0),
-        "slip stuck": lambda own: max(row["slip_stuck"] for row in own),
-        "torque stuck": all_days("stuck", ".1f", scale=100.0),
-    }
-    return table(rows, {"many days": "world"}, columns)
-
-
 STREAMS = Bench("streams", "A day of driving", ABOUT, cases, one_day, tables)
-MANY = Bench(
-    "many-days",
-    "Many days of driving",
-    "Days of `streams`, with the averaged answer of the tracker. Coverage in per cent of rows, "
-    "with the standard error over days; alarms of 1000 sound rows of unchanged soil; most rows of "
-    "a stuck slip that were used on a day.",
-    many,
-    one_day,
-    tables_of_many,
-    long=True,
-)

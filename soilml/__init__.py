@@ -14,56 +14,26 @@ if TYPE_CHECKING:
 
 __version__ = "0.3.0"
 
-#: public name -> the module that defines it; effects of the catalogue come in addition
-_HOME = {
-    "Case": "soilml.config.case",
-    "read_case": "soilml.config.case",
-    "Noise": "soilml.config.measurement_noise",
-    "SoilmlError": "soilml.errors",
-    "simulate": "soilml.fitting.simulation",
-    "gap": "soilml.gap",
-    "adapt": "training.adaptation",
-    "train": "training.train",
-    "METHODS": "soilml.identification",
-    "identify": "soilml.identification",
-    "read_table": "soilml.io.read_table",
-    "Table": "soilml.io.table",
-    "Prior": "soilml.numerics.prior",
-    "advise": "soilml.experiment_design.next_rows",
-    "estimate": "soilml.onboard.table_estimates",
-    "pull": "soilml.traction",
-    "Estimate": "soilml.onboard.estimate",
-    "Estimator": "soilml.onboard.estimator",
-    "SoilTracker": "soilml.onboard.tracking",
-    "Parameter": "soilml.parameters",
-    "Force": "soilml.physics.contact",
-    "EFFECTS": "soilml.physics.effects",
-    "Effect": "soilml.physics.effects",
-    "EffectCard": "soilml.physics.effects",
-    "effect": "soilml.physics.effects",
-    "GEARS": "soilml.physics.gears",
-    "LinearWheel": "soilml.physics.gears",
-    "Midstance": "soilml.physics.gears",
-    "Track": "soilml.physics.gears",
-    "Wheel": "soilml.physics.gears",
-    "Model": "soilml.physics.model",
-    "Operating": "soilml.physics.operating_point",
-    "Soil": "soilml.physics.soils",
-    "soil": "soilml.physics.soils",
-    "soil_catalogue": "soilml.physics.soils",
-    "design": "soilml.rover_design",
-    "export_soil": "soilml.soil_export",
-    "soil_map": "soilml.soil_maps",
-    "Status": "soilml.row_status",
-}
+
+def _home() -> dict[str, str]:
+    """The module that defines each public name, as the stub beside this file states."""
+    import re
+    from pathlib import Path
+
+    stub = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    found = re.findall(r"^from (\S+) import (\w+) as \w+$", stub, re.MULTILINE)
+    return {name: module for module, name in found}
 
 
 def __getattr__(name: str) -> Any:
-    if name in _HOME:
-        return getattr(import_module(_HOME[name]), name)
+    if name.startswith("_") and name != "__all__":
+        raise AttributeError(f"soilml has no {name!r}")
+    home = _home()
+    if name in home:
+        return getattr(import_module(home[name]), name)
     if name == "__all__":
-        return ["__version__", *_HOME, *_effects()]
-    if not name.startswith("_") and name in _effects():
+        return ["__version__", *home, *_effects()]
+    if name in _effects():
         return _effects()[name]
     raise AttributeError(f"soilml has no {name!r}")
 
@@ -73,6 +43,8 @@ def __dir__() -> list[str]:
 
 
 def _effects() -> dict[str, Any]:
-    """Effects of the catalogue by class name."""
-    catalogue = import_module("soilml.physics.effects").EFFECTS
-    return {effect.__name__: effect for effect in catalogue.values()}
+    """The catalogue of effects, what is needed to write one, and its effects by class name."""
+    module = import_module("soilml.physics.effects")
+    names = ("EFFECTS", "Effect", "EffectCard", "effect")
+    catalogue = {effect.__name__: effect for effect in module.EFFECTS.values()}
+    return {name: getattr(module, name) for name in names} | catalogue

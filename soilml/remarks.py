@@ -8,8 +8,6 @@ from typing import Any, Literal
 
 Severity = Literal["note", "warning"]
 
-NEXT_ROW = "next-row"  # Code of a remark that names the measurement to make next
-
 
 @dataclass(frozen=True)
 class Remark:

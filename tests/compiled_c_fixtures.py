@@ -17,7 +17,7 @@ def exported(tmp_path_factory):
     def export(name: str) -> Path:
         def fill(folder: Path) -> None:
             model, out = ROOT / "exported" / f"{name}.onnx", folder / f"{name}.c"
-            assert main(["export-c", str(model), str(out)]) == 0
+            assert main(["export", "c", str(model), str(out)]) == 0
 
         return shared_folder(tmp_path_factory, f"exported_{name}", fill)
 

@@ -2,8 +2,33 @@
 
 import csv
 import io
+import re
 
 from soilml.cli import main
+
+#: A number with more digits than anybody reads; an SI unit in the name of a column, and one beside
+#: a number or as a cell.
+RAW = re.compile(r"\d\.\d{6,}")
+SI_COLUMN = re.compile(r"_(Pa|rad|m)(?!_s)(?=[\s_]|$)")
+SI_UNIT = re.compile(r"(?<=[\d.] )(Pa|rad)\b|  (Pa|rad)\b")
+
+
+def check_tables(text):
+    """Tables of at most 80 columns, with rounded numbers in usual units.
+
+    A table is the lines about a line of dashes, and below it up to a blank line.
+    """
+    lines, found = text.splitlines(), []
+    for i, line in enumerate(lines):
+        if line and set(line) <= {"-", " "}:
+            found.append(lines[i - 1])
+            for row in lines[i:]:
+                if not row or row.startswith("!"):
+                    break
+                found.append(row)
+    assert found and not SI_COLUMN.search(found[0]), text
+    for line in found:
+        assert len(line) <= 80 and not RAW.search(line) and not SI_UNIT.search(line), line
 
 
 def rows_of(text):

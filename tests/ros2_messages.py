@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 import types
 from pathlib import Path
@@ -176,3 +177,14 @@ def put_stand_ins(monkeypatch, store, given):
     put("rcl_interfaces.msg", ParameterDescriptor=lambda **parts: SimpleNamespace(**parts))
     put("std_srvs.srv", Trigger=SimpleNamespace(Request=object, Response=object))
     put("stored", of=store.of)
+
+
+def loaded_node(monkeypatch, store, name, given):
+    """The module of a node, freshly loaded with the given parameters."""
+    monkeypatch.syspath_prepend(str(ROOT / "examples" / "ros2"))
+    put_stand_ins(monkeypatch, store, given)
+    module = f"soil_estimator.{name}"
+    monkeypatch.delitem(sys.modules, module, raising=False)
+    loaded = importlib.import_module(module)
+    monkeypatch.delitem(sys.modules, module)
+    return loaded

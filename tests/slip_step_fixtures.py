@@ -30,7 +30,7 @@ def slip_files(tmp_path_factory):
     from soilml.cli import main
 
     work = tmp_path_factory.mktemp("slip_step")
-    words = ["export-slip", str(SLIP_EXAMPLE / "rover.toml"), str(work / "rover.onnx")]
+    words = ["export", "slip", str(SLIP_EXAMPLE / "rover.toml"), str(work / "rover.onnx")]
     assert main([*words, "--c", str(work / "rover.c"), "--draws", str(SOILS)]) == 0
     return work
 

@@ -28,10 +28,6 @@ def blocks(page, language):
     return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
 
 
-def name_of(page):
-    return str(page.relative_to(ROOT))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("page", RUN)
 def test_python_blocks_run(page, monkeypatch, tmp_path):
@@ -88,15 +84,12 @@ def test_the_answer_of_a_design_is_what_the_command_prints(monkeypatch, tmp_path
     assert [float(x) for x in shown] == pytest.approx([float(x) for x in expected], rel=0.1)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_links_lead_to_files(page):
-    for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text()):
-        if not target.startswith(("http://", "https://")):
-            assert (page.parent / target).exists(), f"{name_of(page)} links to {target}"
-
-
-@pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_named_files_exist(page):
+def test_links_lead_to_files_and_named_files_exist(subtests):
     named = r"`((?:soilml|datagen|training|tests|bench|tools|docs|examples|exported)/[\w/.]+)`"
-    for path in re.findall(named, page.read_text()):
-        assert (ROOT / path).exists(), f"{name_of(page)} names {path}"
+    for page in PAGES:
+        text = page.read_text()
+        targets = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text)
+        files = [page.parent / t for t in targets if not t.startswith(("http://", "https://"))]
+        with subtests.test(page.relative_to(ROOT)):
+            assert not [f for f in files if not f.exists()]
+            assert not [path for path in re.findall(named, text) if not (ROOT / path).exists()]

@@ -17,10 +17,11 @@ MODULES = sorted(
 )
 
 
-@pytest.mark.parametrize("name", MODULES)
-def test_examples_print_what_they_show(name, monkeypatch):
+def test_examples_print_what_they_show(monkeypatch, subtests):
     monkeypatch.chdir(ROOT)
-    failed, tried = doctest.testmod(
-        importlib.import_module(name), optionflags=doctest.NORMALIZE_WHITESPACE
-    )
-    assert tried and not failed
+    for name in MODULES:
+        with subtests.test(name):
+            failed, tried = doctest.testmod(
+                importlib.import_module(name), optionflags=doctest.NORMALIZE_WHITESPACE
+            )
+            assert tried and not failed

@@ -123,30 +123,3 @@ def test_one_valid_set_in_a_hundred_is_flagged(wheel, rows):
             given[name] = np.where(given[f"{name}_std"] < 1e3, given[name], np.nan)
         count += flagged(wheel, given)
     assert count <= binom.ppf(0.9995, len(sets.truth), 0.01)
-
-
-def test_one_row_does_not_determine_three_unknowns(wheel):
-    """One row narrows the prior at its ends only, and the intervals keep their coverage."""
-    inside, widths = [], []
-    for k, soil in enumerate(soils(60, 3)):
-        one = {name: value[k % 12 : k % 12 + 1] for name, value in simulate(soil, k).items()}
-        estimate = wheel.run(**torque_only(one))
-        if estimate.in_range:
-            assert np.abs((soil - estimate.mean) / estimate.std).max() < 4.0
-            inside.append((estimate.low <= soil) & (soil <= estimate.high))
-            widths.append(np.mean(estimate.std / wheel.prior.std))
-    assert len(inside) >= 57
-    assert np.mean(inside) > 0.85
-    assert np.quantile(widths, 0.1) > 0.5 and np.median(widths) > 0.8
-
-
-def test_channels_may_be_missing_in_some_rows(wheel):
-    rows = simulate((900.0, 0.6, 0.012))
-    half = {
-        name: np.where((np.arange(12) % 2 == 0) & (name in CHANNELS[3:]), np.nan, value)
-        for name, value in rows.items()
-    }
-    estimate, all_of_them = wheel.run(**half), wheel.run(**rows)
-    assert estimate.in_range
-    assert (estimate.std < 1.02 * wheel.run(**torque_only(rows)).std).all()
-    assert np.prod(estimate.std) > np.prod(all_of_them.std)

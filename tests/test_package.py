@@ -62,6 +62,7 @@ def test_the_wheel_holds_the_packages_and_their_data(wheel):
         "training/specs/fused.toml",
         "soilml/py.typed",
         "soilml/__init__.pyi",
+        *(f"soilml/examples/{name}" for name in ("campaign/runs.csv", "log/rig.csv")),
         *(f"soilml/released/{file.name}" for file in (ROOT / "exported").glob("*.onnx")),
     ):
         assert needed in names

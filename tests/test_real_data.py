@@ -101,7 +101,7 @@ def test_plate_and_shear_tests_contain_their_known_soil(tmp_path, monkeypatch):
     module.run()
     made = tmp_path / "demo/bevameter"
     words = ["bevameter", str(made / "crm_plates.csv"), str(made / "crm_ring.csv")]
-    assert main([*words, "--json", str(tmp_path / "crm.json")]) == 0
+    assert main([*words, "--out", str(tmp_path / "crm.json")]) == 0
     found = json.loads((tmp_path / "crm.json").read_text())
     known = {"kphi": 2.2e6, "kc": -1.1e5, "n": 1.2}
     known |= {"cohesion": 2495.0, "friction_angle": 0.4189, "shear_modulus": 0.003}
@@ -110,7 +110,7 @@ def test_plate_and_shear_tests_contain_their_known_soil(tmp_path, monkeypatch):
         assert low <= value <= high, name
     assert remarked(found["remarks"], "failure line is curved")
     words = ["bevameter", str(made / "cullinan_shear.csv")]
-    assert main([*words, "--json", str(tmp_path / "sand.json")]) == 0
+    assert main([*words, "--out", str(tmp_path / "sand.json")]) == 0
     found = json.loads((tmp_path / "sand.json").read_text())
     low, high = found["estimates"]["shear_strength"]["another_place_95"]
     assert low <= 93e3 * 0.637 <= high  # tan 32.5 degrees, without cohesion

@@ -1,4 +1,4 @@
-"""Reference sets, their exact posteriors, and the posterior that the state of a file defines."""
+"""Reference sets, their exact posteriors, and the answers of files to them."""
 
 import sys
 from dataclasses import replace
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import kstest, multivariate_normal
+from scipy.stats import multivariate_normal
 
 from datagen.recipe import read_recipe
 from soilml.config.measurement_noise import Noise
@@ -21,12 +21,8 @@ from training.spec import read_any_wheel_spec
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
 
-from exact_sets import exact_set_posterior, posterior_of_memory
-from reference_sets import (
-    ONE_WHEEL,
-    generate_reference_sets,
-    stored_posteriors,
-)
+from exact_sets import exact_set_posterior
+from reference_sets import ONE_WHEEL, generate_reference_sets, stored_posteriors
 
 pytestmark = pytest.mark.slow
 
@@ -95,15 +91,13 @@ def test_it_agrees_with_integration_on_a_grid(rows, noise, bias):
     apart = (found.covariance - covariance) / np.outer(std, std)
     assert np.all(np.abs(apart) < 0.08)
     assert found.log_evidence == pytest.approx(evidence, abs=0.06)
-    below = weights @ (values < sets.truth[index])
-    assert np.all(np.abs(found.rank - below) < 0.05)
 
 
 def test_uncertain_bearing_is_marginalised():
     family = read_any_wheel_spec("any_wheel").family
     assert isinstance(family, DimensionlessFamily)
     sets = family.sets(300, 1, 9)
-    o = sets.origin
+    o = sets
     more = sets.readings["sinkage_std"][:, 0] < 1.0
     uncertain = (o.noise["torque"][1][:, 0] > 0.06) & (o.normal_std > 0.2) & ~more
     index = int(np.flatnonzero(uncertain)[0])
@@ -125,18 +119,9 @@ def test_uncertain_bearing_is_marginalised():
     assert np.all(np.abs(np.sqrt(np.diag(found.covariance)) / std - 1.0) < 0.06)
 
 
-def test_ranks_of_the_truth_are_uniform():
-    family = of_one_wheel(0.02)
-    sets = family.sets(40, 1, 12)
-    found = [exact_set_posterior(family, sets, i) for i in range(len(sets.truth))]
-    for rank in np.stack([f.rank for f in found]).T:
-        assert kstest(rank, "uniform").pvalue > 1e-3
-    assert kstest([f.hpd_level for f in found], "uniform").pvalue > 1e-3
-
-
 @pytest.fixture(scope="module")
-def triples(wheel_posterior):
-    """(output of the graph, posterior of its memory, exact posterior) of sets; small response."""
+def pairs(wheel_posterior):
+    """(output of the graph, exact posterior) of sets; small response."""
     family, response = wheel_posterior.family, wheel_posterior.response
     free = MisfitLimits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
     session = posterior_session(SetPosteriorGraph(family, response, free))
@@ -145,28 +130,15 @@ def triples(wheel_posterior):
         sets = family.sets(14, rows, 21)
         for i in range(len(sets.truth)):
             output = graph_outputs(session, response, sets, i)
-            system = output["memory_out"].astype(float)
-            found.append(
-                (
-                    output,
-                    posterior_of_memory(family, system, sets, i),
-                    exact_set_posterior(family, sets, i),
-                )
-            )
+            found.append((output, exact_set_posterior(family, sets, i)))
     return found
 
 
-def test_the_estimate_is_close_to_the_exact_posterior(triples):
-    off = [(s["set_mean"] - e.mean) / np.sqrt(np.diag(e.covariance)) for s, _, e in triples]
+def test_the_estimate_is_close_to_the_exact_posterior(pairs):
+    off = [(s["set_mean"] - e.mean) / np.sqrt(np.diag(e.covariance)) for s, e in pairs]
     assert np.sqrt(np.mean(np.square(off))) < 0.3
-    wide = [s["set_std"] / np.sqrt(np.diag(e.covariance)) for s, _, e in triples]
+    wide = [s["set_std"] / np.sqrt(np.diag(e.covariance)) for s, e in pairs]
     assert 0.85 < np.median(wide) < 1.15
-
-
-def test_the_log_density_at_the_truth_is_that_of_the_exact_posterior(triples):
-    gap = [e.log_density - m.log_density for _, m, e in triples]
-    assert abs(np.mean(gap)) < 0.2
-    assert np.mean([e.log_density for _, _, e in triples]) > 1.0  # both are far above the prior
 
 
 def test_sets_are_scored_beside_their_exact_posterior():
@@ -178,7 +150,7 @@ def test_sets_are_scored_beside_their_exact_posterior():
     assert len(rows) == 3 and all(row["answered"] for row in rows)
     ratio, _ = sets.rmse_ratio(rows)
     assert np.all((ratio > 0.7) & (ratio < 1.4))
-    exact = [row | {"error": [row["error"][1]] * 2, "log_density": [2.0, 2.3]} for row in rows]
+    exact = [row | {"error": [row["error"][1]] * 2} for row in rows]
     assert sets.rmse_ratio(exact)[0] == pytest.approx(1.0)
     text = sets.tables([row | {"held90": np.ones((2, 3), bool)} for row in exact])
-    assert "| 0.300 |" in text and "100.0% / 100.0%" in text
+    assert "| 1.000 |" in text and "100.0% / 100.0%" in text

@@ -2,7 +2,6 @@
 
 import math
 import sys
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -55,18 +54,6 @@ def test_a_drive_over_sand_is_recognised(prompt):
         assert last.values[f"{name}_low"] < last.values[name] < last.values[f"{name}_high"]
 
 
-def test_rows_that_fit_no_exact_model_are_told(prompt):
-    assert prompt[-1].values["disagrees"] == 0.0
-    own, found = logic(), []
-    for at, (kind, stamp, *parts) in contents(drive(30)):
-        if kind == "joints":
-            parts[2] = [0.5 * effort for effort in parts[2]]
-        found += play(own, [(at, (kind, stamp, *parts))])
-    last = found[-1]
-    assert last.values["disagrees"] == 1.0 and last.level is Level.WARN
-    assert last.values["in_range"] == 1.0 and "check units" in own.soil().message
-
-
 def test_messages_that_wait_on_the_way_and_come_twice_give_the_same_rows(prompt):
     rng, ready, mixed = np.random.default_rng(0), {"joints": 0.0, "odometry": 0.0}, []
     for at, (kind, *parts) in contents(drive()):
@@ -113,17 +100,6 @@ def test_what_does_not_arrive_is_told():
     play(own, contents(drive(10)))
     assert own.inputs(110.0).level is Level.OK
     assert own.inputs(120.0).message == "no velocity of the joint for 10.1 s"
-
-
-def test_after_another_soil_it_recovers_by_itself(prompt):
-    own = logic()
-    other = replace(SAND, cohesion=300.0, friction_angle=0.75, shear_modulus=0.01)
-    play(own, contents(drive(40)))
-    after = play(own, contents(drive(40, other, begin=200, seed=1)))
-    events = [report.values["event"] for report in after]
-    assert "SOIL_CHANGED" in events[:8]
-    assert after[-1].level is Level.OK and after[-1].values["in_range"] == 1.0
-    assert after[-1].values["friction_angle"] > 1.1 * prompt[-1].values["friction_angle"]
 
 
 @pytest.mark.parametrize("fault", ["torque", "speed", "silent"])
@@ -250,14 +226,6 @@ def test_rows_are_kept_in_the_state_file(tmp_path):
         path.write_bytes(damaged)
         assert "is not used" in logic(state_file=str(path)).remark
     assert logic().remark == "" and Path(MODEL).exists()
-
-
-def test_restart_forgets_the_soil():
-    own = logic()
-    play(own, contents(drive(10)))
-    own.restart()
-    assert own.soil().values["rows_remembered"] == 0.0
-    assert own.soil().level is Level.WARN
 
 
 def test_the_state_is_written_as_the_rover_goes(tmp_path):

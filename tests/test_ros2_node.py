@@ -1,12 +1,11 @@
 """The ROS 2 node with real message definitions and stand-ins for the libraries of ROS."""
 
-import importlib
 import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ros2_messages import GIVEN, ROOT, SECOND, MessageStore, contents, drive, put_stand_ins
+from ros2_messages import GIVEN, SECOND, MessageStore, contents, drive, loaded_node
 
 pytest.importorskip("rosbags")
 
@@ -18,16 +17,8 @@ def store():
 
 @pytest.fixture
 def node_module(monkeypatch, store):
-    """The module of the node, freshly loaded with the given parameters."""
-    monkeypatch.syspath_prepend(str(ROOT / "examples" / "ros2"))
-
-    def load(**given):
-        put_stand_ins(monkeypatch, store, GIVEN | given)
-        sys.modules.pop("soil_estimator.node", None)
-        return importlib.import_module("soil_estimator.node")
-
-    yield load
-    sys.modules.pop("soil_estimator.node", None)
+    """A function that loads the module of the node with the given parameters."""
+    return lambda **given: loaded_node(monkeypatch, store, "node", GIVEN | given)
 
 
 def header(store, stamp):

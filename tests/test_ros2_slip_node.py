@@ -1,12 +1,10 @@
 """The ROS 2 node that publishes a speed without odometry, with real message definitions."""
 
-import importlib
-import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ros2_messages import ROOT, SECOND, MessageStore, put_stand_ins
+from ros2_messages import ROOT, SECOND, MessageStore, loaded_node
 
 from soilml import read_case, read_table
 from soilml.cli import main
@@ -28,23 +26,15 @@ def store():
 @pytest.fixture(scope="module")
 def model(tmp_path_factory):
     file = str(tmp_path_factory.mktemp("slip_node") / "rover.onnx")
-    assert main(["export-slip", str(SLIP / "rover.toml"), file, "--draws", "128"]) == 0
+    assert main(["export", "slip", str(SLIP / "rover.toml"), file, "--draws", "128"]) == 0
     return file
 
 
 @pytest.fixture
 def node_module(monkeypatch, store, model):
-    """The module of the node, freshly loaded with the given parameters."""
-    monkeypatch.syspath_prepend(str(ROOT / "examples" / "ros2"))
-
-    def load(**given):
-        usual = {"model": model, "joints": JOINTS, "wheel_radius": RADIUS}
-        put_stand_ins(monkeypatch, store, usual | given)
-        sys.modules.pop("soil_estimator.slip_node", None)
-        return importlib.import_module("soil_estimator.slip_node")
-
-    yield load
-    sys.modules.pop("soil_estimator.slip_node", None)
+    """A function that loads the module of the node with the given parameters."""
+    usual = {"model": model, "joints": JOINTS, "wheel_radius": RADIUS}
+    return lambda **given: loaded_node(monkeypatch, store, "slip_node", usual | given)
 
 
 @pytest.fixture(scope="module")

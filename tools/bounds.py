@@ -47,9 +47,9 @@ CASES = (
     ("identify, linear", "identify m.toml runs.csv --method linear --out o.json", 10**5),
     ("posterior", "identify m.toml runs.csv --method posterior --out o.json", 10**5),
     ("posterior, 5000", "identify m.toml runs.csv --method posterior --out o.json", 5000),
-    ("advise", "advise m.toml runs.csv --out o.csv", 10**6),
+    ("plan next", "plan next m.toml runs.csv --out o.csv", 10**6),
     ("pull", "pull m.toml runs.csv --out o.csv", 10**6),
-    ("audit", "audit m.toml runs.csv --out o.json", 12000),
+    ("plan effects", "plan effects m.toml runs.csv --out o.json", 12000),
     ("gap", "gap m.toml runs.csv --out found", 1200),
     ("gap, refused", "gap m.toml runs.csv --out found", 12000),
 )  # fmt: skip

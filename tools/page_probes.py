@@ -93,8 +93,8 @@ def _map_compare(script: ModuleType) -> Callable[[], object]:
 
 
 def _moon(script: ModuleType) -> None:
-    """One law of gravity and one radius, and no picture."""
-    script.LAWS, script.RADII, script.draw = ("open",), (0.1,), _nothing
+    """One law of gravity, and no picture."""
+    script.LAWS, script.draw = ("open",), _nothing
 
 
 #: What makes a script small, by its path.

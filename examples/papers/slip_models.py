@@ -15,10 +15,11 @@ from matplotlib.figure import Figure
 
 from datagen.generate import generate
 from datagen.recipe import packaged_file, read_recipe
-from soilml import Estimator, read_table
+from soilml import Estimate, Estimator, read_table
 from soilml.io.atomic_files import atomic_output
-from soilml.onboard.multi_sensor import ACROSS_FILES, fuse_estimates
-from soilml.quantities import column
+from soilml.onboard.fusion_rules import inverse_variance
+from soilml.onboard.multi_sensor import fuse_estimates
+from soilml.quantities import Z_90, column
 from soilml.report.aligned_text import format_table
 from training.dataset import read_dataset
 from training.export.model_file import export_model
@@ -98,6 +99,14 @@ def line(name: str, relative: float, cover: float) -> tuple[str, str, str]:
     return name, f"{relative:.2f}", f"{cover:.0%}"
 
 
+def independent(pair: list[Estimate]) -> Estimate:
+    """Estimates of two files fused by eq. 26, as if their errors were independent."""
+    first, second = pair
+    fused = inverse_variance(np.stack([first.mean, second.mean]), np.stack([first.std, second.std]))
+    ends = {"low": fused.mean - Z_90 * fused.std, "high": fused.mean + Z_90 * fused.std}
+    return replace(first, mean=fused.mean, std=fused.std, **ends)
+
+
 def slip_of(folder: Path, changes: dict[str, str]) -> tuple[list[tuple[str, str, str]], dict]:
     """Figures of slip in one case; true slip and estimates of two files, rows of another seed."""
     data, test = made(folder, changes, ROWS, 1), made(folder, changes, TEST_ROWS, 2)
@@ -115,10 +124,9 @@ def slip_of(folder: Path, changes: dict[str, str]) -> tuple[list[tuple[str, str,
         alone[name] = estimator(**{n: table[column(n)] for n in estimator.inputs})
     machines, linear = [*alone.values()][:2], [*alone.values()][2:]
     found = dict(alone)
-    for rule in ACROSS_FILES:
-        found[f"two files: {rule}"] = fuse_estimates(machines, rule).estimate
-    for rule in ("correlated", "prior-once", "inverse-variance"):
-        found[f"two linear files: {rule}"] = fuse_estimates(linear, rule).estimate
+    for name, pair in (("two files", machines), ("two linear files", linear)):
+        found[f"{name}: correlated"] = fuse_estimates(pair).estimate
+        found[f"{name}: eq. 26"] = independent(pair)
     for place, (name, estimate) in enumerate(found.items()):
         off = estimate.mean[:, 0] - table["slip"]
         held = (estimate.low[:, 0] <= table["slip"]) & (table["slip"] <= estimate.high[:, 0])
@@ -168,7 +176,7 @@ def draw(found: dict, shares: dict[str, list[float]], soil: dict[str, np.ndarray
         held = [np.mean(np.abs(slip - estimate.mean[:, 0]) <= _half(b) * estimate.std[:, 0])
                 for b in BANDS]  # fmt: skip
         axes[1][0].plot(100 * BANDS, 100 * (held - BANDS), color=f"C{k}", label=title)
-    twice = found["two files: inverse-variance"]
+    twice = found["two files: eq. 26"]
     held = [np.mean(np.abs(slip - twice.mean[:, 0]) <= _half(b) * twice.std[:, 0]) for b in BANDS]
     axes[1][0].plot(100 * BANDS, 100 * (held - BANDS), "--", color="C3", label="both by eq. 26")
     axes[1][0].axhline(0.0, color="k", lw=0.8)

@@ -33,17 +33,13 @@ friction angle and shear modulus, each with its uncertainty.
 EPILOG = "`soilml COMMAND --help` explains one command with an example."
 _OWN, _GROUND = "soilml.cli.commands.", "training.commands."
 
-#: Commands by section of the list: the module of each, and what the list says. They are present
-#: where the packages can be imported, installed or not. Those of other distributions have an entry
-#: point in the group `soilml.commands`.
+#: Commands by section of the list: the module of each, and what the list says.
 SECTIONS: dict[str, dict[str, tuple[str, str]]] = {
     "Start": {
         "example": (_OWN + "example", "files to try the commands with"),
         "init": (_OWN + "init", "a first model file: wheel, soil, priors, noise"),
         "serve": ("soilml.serve.command", "all of this in the browser"),
-        "show models": (_OWN + "models", "trained files that come with the package"),
-        "show soils": (_OWN + "soils", "published soils, or one with its source"),
-        "show effects": (_OWN + "effects", "effects that a model can include, or one of them"),
+        "show": (_OWN + "show", "published soils, effects, trained files; or one of them"),
         "setup check": (_OWN + "doctor", "libraries, trained files, output of this installation"),
         "setup completion": (_OWN + "completion", "completion for bash, zsh or fish"),
     },
@@ -91,18 +87,14 @@ SECTIONS: dict[str, dict[str, tuple[str, str]]] = {
 COMMANDS = {name: entry[0] for own in SECTIONS.values() for name, entry in own.items()}
 #: What the list says of commands of two words.
 GROUPS = {
-    "show": "what comes with the package",
     "setup": "this installation",
     "export": "files for a board or a simulator",
     "drive": "along a drive",
     "plan": "what to measure or build next",
     "paper": "of the papers",
 }
-#: Options whose value may begin with a minus sign.
-_NEGATIVE_VALUES = ("--slip", "--load")
 _WRONG_COMMAND = re.compile(r"argument COMMAND: invalid choice: '(.*)' \(choose from (.*)\)")
 _UNKNOWN_OPTION = re.compile(r"unrecognized arguments: (?:[^-].*? )?(--?[\w-]+)")
-_NEGATIVE = re.compile(r"-[\d.]")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -112,6 +104,10 @@ class _Parser(argparse.ArgumentParser):
     """
 
     known: Sequence[str] = ()
+
+    def __init__(self, *words: Any, **options: Any) -> None:
+        super().__init__(*words, **options)
+        self._negative_number_matcher = re.compile(r"-[\d.]")  # -0.3:0.6:10 is a value
 
     def error(self, message: str) -> NoReturn:
         wrong = _WRONG_COMMAND.fullmatch(message)
@@ -142,16 +138,15 @@ def parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
     """
     layout: Any = argparse.RawDescriptionHelpFormatter
     chosen = None if words is None else _command_of(words)
-    known = COMMANDS if chosen else COMMANDS | _other_commands()
-    listed = "\n".join([DESCRIPTION, *_list(known)])
+    listed = "\n".join([DESCRIPTION, *_list()])
     usage = "soilml COMMAND ... [--help] [--version]"
     root = _Parser("soilml", usage, listed, EPILOG, formatter_class=layout)
     root.add_argument("--version", action="version", version=f"soilml {__version__}")
     required: dict[str, Any] = {"metavar": "COMMAND", "required": True}
     commands = root.add_subparsers(prog="soilml", help=argparse.SUPPRESS, **required)
     groups: dict[str, Any] = {}
-    helps = {name: entry[1] for own in SECTIONS.values() for name, entry in own.items()}
-    for name, path in known.items():
+    known = {name: entry for own in SECTIONS.values() for name, entry in own.items()}
+    for name, (path, said) in known.items():
         group, _, word = name.rpartition(" ")
         if group and group not in groups:
             text = f"{GROUPS[group][0].upper()}{GROUPS[group][1:]}."
@@ -159,12 +154,11 @@ def parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
             groups[group] = made.add_subparsers(**required)
         into = groups[group] if group else commands
         if words is not None and name != chosen:
-            into.add_parser(word, help=helps.get(name, ""))
+            into.add_parser(word, help=said)
             continue
         module = importlib.import_module(path)
-        sub = into.add_parser(
-            word, help=helps.get(name, ""), description=module.DESCRIPTION, formatter_class=layout
-        )
+        about = module.DESCRIPTION
+        sub = into.add_parser(word, help=said, description=about, formatter_class=layout)
         declare(sub, (*module.ARGUMENTS, "screen"))
         if formats := getattr(module, "FORMATS", ()):
             text = "form of the result on standard output (default: table)"
@@ -182,10 +176,9 @@ def _command_of(words: Sequence[str]) -> str:
     return next((" ".join(words[:n]) for n in (1, 2) if " ".join(words[:n]) in COMMANDS), "")
 
 
-def _list(known: dict[str, str]) -> Iterator[str]:
+def _list() -> Iterator[str]:
     """The lines of the list of commands; a group is one line."""
-    others = dict.fromkeys(known.keys() - COMMANDS.keys(), ("", "of another package"))
-    for title, own in (SECTIONS | ({"Others": others} if others else {})).items():
+    for title, own in SECTIONS.items():
         seen: dict[str, str] = {}
         for name, (_, text) in own.items():
             group, _, word = name.rpartition(" ")
@@ -196,19 +189,6 @@ def _list(known: dict[str, str]) -> Iterator[str]:
             seen[group] = f"{before}{', ' if before else ''}{word}: {GROUPS[group]}"
         yield f"{title}:"
         yield from (f"  {name:<10} {text}" for name, text in seen.items())
-
-
-def _other_commands() -> dict[str, str]:
-    """Modules of the commands of other distributions, by name."""
-    from importlib.metadata import entry_points
-
-    # an installation of this one that is older than its files may name a command that is gone
-    others = {
-        entry.name: entry.value
-        for entry in entry_points(group="soilml.commands")
-        if entry.dist is None or entry.dist.name != "soilml"
-    }
-    return {name: others[name] for name in sorted(others.keys() - COMMANDS.keys())}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -268,7 +248,9 @@ def _run(arguments: Sequence[str] | None, signals: StopSignals) -> int:
 def _status(words: list[str]) -> int:
     """Run the command of these words; returns the exit status."""
     typed = words or ["--help"]
-    words = _join_negative_values(present_words(typed))
+    words = present_words(typed)
+    if empty := [word for word in words if word.startswith("--") and word.endswith("=--")]:
+        raise InputError(f"{empty[0]}: needed is a value after the equals sign")
     args = parser(words).parse_args(words)
     args.command_line, args.make_parser = typed, parser
     SCREEN.choose(getattr(args, "format", None), args.quiet, args.verbose)
@@ -288,16 +270,3 @@ def _interrupted(stop: KeyboardInterrupt | Terminated) -> int:
     written = f"complete before that: {', '.join(replaced)}" if replaced else ""
     said = getattr(stop, "said", f"interrupted; {written or 'no output was written'}")
     return fail(said, int(code or 0))
-
-
-def _join_negative_values(words: list[str]) -> list[str]:
-    """`--slip -0.3:0.6:10` as one word, because argparse would read two options."""
-    joined: list[str] = []
-    for word in words:
-        if word.startswith("--") and word.endswith("=--"):  # argparse drops this value
-            raise InputError(f"{word}: needed is a value after the equals sign")
-        if joined and joined[-1] in _NEGATIVE_VALUES and _NEGATIVE.match(word):
-            joined[-1] += f"={word}"
-        else:
-            joined.append(word)
-    return joined

@@ -34,7 +34,6 @@ OPTIONS: Mapping[str, Mapping[str, str]] = {
     "bevameter": {"--json": "--out"},
     "drive slip": {"--json": "--out"},
     "estimate": {"--case": "--model"},
-    "export c": {"--rows": "--step-rows"},
     "export slip": {"--soils": "--draws"},
     "export soil": {"--run": "--group"},
     "paper numbers": {"--json": "--out"},

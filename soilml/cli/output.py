@@ -116,15 +116,15 @@ def tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
     write_stdout(f"{ReportTable.of('rows', first | others).text()}\n")
 
 
-def show_result(report: Report, content: Mapping[str, Any]) -> None:
+def show_result(report: Report, content: Mapping[str, Any], details: bool = False) -> None:
     """Print a report as text, or its content as JSON where --format says so.
 
-    -v prints all of it, -q no remarks.
+    -v, or `details`, prints all of it, -q no remarks.
     """
     if SCREEN.form == "json":
         write_stdout(json_text(content))
         return
-    show((replace(report, remarks=()) if SCREEN.quiet else report).text(SCREEN.verbose))
+    show((replace(report, remarks=()) if SCREEN.quiet else report).text(details or SCREEN.verbose))
 
 
 def show(text: str) -> None:

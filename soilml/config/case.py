@@ -314,9 +314,8 @@ def take_case(
     """The case in the tables that `read_case` reads; others are left unread."""
     gears: dict[str, Model] = {}
     gear_priors: dict[str, Prior] = {}
-    of_gears: tuple[str, ...] = ()
     if "gears" in settings:
-        gears, gear_priors, of_gears = take_gears(settings, effects)
+        gears, gear_priors = take_gears(settings, effects)
         if not gears:
             settings.fail("[gears] is empty; write each gear as [gears.NAME]")
         model = Model(next(iter(gears.values())).gear)
@@ -332,7 +331,7 @@ def take_case(
         if with_simulator:
             gear, simulator = emulated(simulator, own_soil, prior)
             model = Model(gear)
-    model, effect_priors, suspected = take_effects(settings.tables("effect"), effects, model)
+    model, effect_priors = take_effects(settings.tables("effect"), effects, model)
     for name, other in gears.items():
         for effect in model.effects:
             if not effect.applies_to(other.gear):
@@ -358,4 +357,4 @@ def take_case(
         case = replace(case, rover=take_rover(settings.table("rover"), gears or {"": model}))
     if "remainder" in settings:
         case = replace(case, remainder=take_remainder(settings.table("remainder"), gears))
-    return take_explanations(settings, effects, case, (*suspected, *of_gears))
+    return take_explanations(settings, effects, case)

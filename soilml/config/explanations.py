@@ -7,7 +7,7 @@ noise and remainder, each with its own effects and soil.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -58,20 +58,12 @@ class CaseExplanation:
         return CaseExplanation(weight, case.model, case.soil, dict(case.gears), dict(case.prior))
 
 
-def take_explanations(
-    settings: Settings, effects: Effects, base: Case, suspected: Sequence[str]
-) -> Case:
+def take_explanations(settings: Settings, effects: Effects, base: Case) -> Case:
     """A case with what its tables [[explanation]] say.
-
-    suspected: Effects that earlier versions of `gap` wrote and did not name: with them, the case is
-        the only explanation.
 
     Raises `InputError` for a weight outside 0 to 1, weights that add up to more than one, and what
     [soil], [soil.prior] and [[effect]] refuse.
     """
-    if suspected:
-        only = (CaseExplanation.of(1.0, base),)
-        return replace(without_effects(base, suspected), explanations=only)
     entries = settings.tables("explanation")
     if len(entries) > MOST_EXPLANATIONS:
         entries[0].fail(f"{len(entries)} explanations; at most {MOST_EXPLANATIONS} are possible")
@@ -93,7 +85,7 @@ def _take(entry: Settings, effects: Effects, base: Case) -> CaseExplanation:
         if gear and gear not in gears:
             effect.fail(f"gear is {gear!r}; there are: {', '.join(gears) or 'none with a name'}")
         before = gears[gear] if gear else model
-        added, priors, _ = take_effects([effect], effects, Model(before.gear))
+        added, priors = take_effects([effect], effects, Model(before.gear))
         (new,) = added.effects
         after = replace(before, effects=(*_without(before, new.name), new))
         if gear:
@@ -120,22 +112,6 @@ def added_effects(base: Case, one: CaseExplanation) -> dict[str, Effect]:
     """Effects of an explanation that the case lacks, or has with other values, by name."""
     known = _by_name(base.model, base.gears)
     return {n: e for n, e in _by_name(one.model, one.gears).items() if known.get(n) != e}
-
-
-def without_effects(case: Case, names: Sequence[str]) -> Case:
-    """A case without some of its effects, by name, and without their priors."""
-
-    def kept(model: Model, of_gear: str = "") -> Model:
-        return replace(
-            model, effects=tuple(e for e in model.effects if f"{e.name}{of_gear}" not in names)
-        )
-
-    return replace(
-        case,
-        model=kept(case.model),
-        gears={name: kept(own, f"@{name}") for name, own in case.gears.items()},
-        prior={p: v for p, v in case.prior.items() if p.partition(".")[0] not in names},
-    )
 
 
 def one_of(case: Case, what: str) -> Case:

@@ -20,7 +20,6 @@ from soilml.physics.soils import Soil, soil
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength, SoilTest
 
 UNNAMED_GEAR = "gear"  # Name of the gear in [gear], beside those in [gears.NAME]
-SUSPECTED = "suspected"  # Key by which earlier versions marked what predicts and is not named
 #: Priors about zero by the name that they have in a model file.
 NORMAL = {"normal": Prior.normal, "half-normal": Prior.half_normal}
 #: Kinds of tests; the key of the measured quantity identifies the kind.
@@ -41,13 +40,10 @@ def take_gear(settings: Settings) -> Gear:
     return gear
 
 
-def take_gears(
-    settings: Settings, effects: Effects
-) -> tuple[dict[str, Model], dict[str, Prior], tuple[str, ...]]:
+def take_gears(settings: Settings, effects: Effects) -> tuple[dict[str, Model], dict[str, Prior]]:
     """The gears in [gear], where it is present, and in [gears.NAME], with their own effects.
 
-    The priors are those of the effects, by path: `grousers@lugged.height`. Then come the names of
-    the effects that are suspected: `grousers@lugged`.
+    The priors are those of the effects, by path: `grousers@lugged.height`.
     """
     tables = {}
     if "gear" in settings:
@@ -59,24 +55,21 @@ def take_gears(
         if name in tables:
             named.fail(f"{name!r} is the name of the gear in [gear]; take another one")
         tables[name] = named.table(name)
-    gears, priors, suspected = {}, {}, []
+    gears, priors = {}, {}
     for name, own in tables.items():
         entries = own.tables("effect")
-        model, own_priors, marked = take_effects(entries, effects, Model(take_gear(own)))
-        gears[name] = model
-        suspected += [f"{effect}@{name}" for effect in marked]
+        gears[name], own_priors = take_effects(entries, effects, Model(take_gear(own)))
         for path, prior in own_priors.items():
             effect, _, parameter = path.partition(".")
             priors[f"{effect}@{name}.{parameter}"] = prior
-    return gears, priors, tuple(suspected)
+    return gears, priors
 
 
 def take_effects(
     entries: list[Settings], effects: Effects, model: Model
-) -> tuple[Model, dict[str, Prior], tuple[str, ...]]:
-    """The model with the effects of tables [[effect]], their priors by path, and suspected ones."""
+) -> tuple[Model, dict[str, Prior]]:
+    """The model with the effects of tables [[effect]], and their priors by path."""
     prior: dict[str, Prior] = {}
-    suspected = []
     for entry in entries:
         name = entry.text("name")
         if name not in effects:
@@ -84,14 +77,12 @@ def take_effects(
                 f"name is {name!r}; {did_you_mean(name, effects)}there are: {', '.join(effects)}"
             )
         priors = entry.table("prior")
-        if entry.take(SUSPECTED, bool, "true or false", False):
-            suspected.append(name)
         try:
             model = model + take_declared(effects[name], entry)
         except InputError as error:
             entry.fail(str(error).removeprefix(f"{entry.where}: "))
         prior |= {f"{name}.{k}": v for k, v in take_priors(priors, effects[name]).items()}
-    return model, prior, tuple(suspected)
+    return model, prior
 
 
 def take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior], tuple[SoilTest, ...]]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import InputError
-from soilml.io.declared_settings import Numbers
+from soilml.io.declared_settings import Key, Numbers, take_declared
 from soilml.io.read_table import read_table
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
@@ -22,6 +23,7 @@ from soilml.optional_imports import need
 from soilml.parameters import declared
 from soilml.physics.gears.base import Gear
 from soilml.physics.gears.emulated import EmulatedGear
+from soilml.physics.operating_point import MOST_SLIP
 from soilml.physics.soils import Soil
 from soilml.quantities import CHANNELS, QUANTITIES, column
 
@@ -30,6 +32,7 @@ from soilml.quantities import CHANNELS, QUANTITIES, column
 FEWEST, ADVISED = 5, 10
 #: Relative difference of the outputs of two runs with equal inputs that is taken for rounding.
 SAME = 1e-6
+LEAST_LOAD, MOST_LOAD = 1e-6, 1e7  # N, of tables
 
 
 @dataclass(frozen=True)
@@ -37,14 +40,8 @@ class Simulator:
     """The table [simulator] of a model file, and the error of the emulator of its runs."""
 
     runs: Path | None  # File of the runs; None where the model file has them within it
-    # The Python file and its function that make runs, None and "" where none does; or the command
-    # with {design} and {runs} that makes them. Neither is run by what reads a file
-    python: Path | None
-    function: str
-    command: str
     slip: tuple[float, float]  # Ranges of the design
     load: tuple[float, float]  # N
-    folder: Path | None  # In which the command is run: that of the model file
     gear: Gear  # Of the model file
     # Standard deviation of the emulator by column, in its unit; empty where no runs were read
     error: dict[str, float] = field(default_factory=dict)
@@ -52,20 +49,12 @@ class Simulator:
     # The runs: those of the file, or of the key `runs`, by which a recipe has them within it
     runs_read: Table | None = field(default=None, repr=False, compare=False)
 
-    @property
-    def code(self) -> str:
-        """What makes runs, as the model file has it; "" where nothing does."""
-        return self.command or (f"{self.python}:{self.function}" if self.python else "")
-
     def as_settings(self) -> dict[str, object]:
-        """The table [simulator], with the full paths of its files."""
-        python = f"{self.python.resolve()}:{self.function}" if self.python else ""
-        own: dict[str, object] = {"runs": Inline(self.columns())}
+        """The table [simulator], with the full path of its file."""
+        found: dict[str, object] = {"runs": Inline(self.columns())}
         if self.runs is not None:
-            own = {"table": str(self.runs.resolve())}
-        made = {"python": python, "command": self.command}
-        own |= {key: text for key, text in made.items() if text}
-        return own | {"slip": list(self.slip), "load_N": list(self.load)}
+            found = {"table": str(self.runs.resolve())}
+        return found | {"slip": list(self.slip), "load_N": list(self.load)}
 
     def columns(self) -> dict[str, list[float]]:
         """The runs that were read, as lists of numbers by column."""
@@ -77,50 +66,46 @@ class Simulator:
         return {"runs": self.columns(), "slip": list(self.slip), "load_N": list(self.load)}
 
 
+class RunsWithin:
+    """The runs of a simulator within settings: a list of as many numbers for each column."""
+
+    def take(self, settings: Settings, key: str, kind: str) -> Table:
+        """The runs as a table."""
+        needed = "lists of as many numbers, by column"
+        found = settings.take(key, dict, needed)
+        try:
+            columns = {name: np.asarray(own, dtype=np.float64) for name, own in found.items()}
+        except (TypeError, ValueError):
+            settings.fail(f"{key} has a value that is no number; needed are {needed}")
+        if {x.ndim for x in columns.values()} != {1} or len({*map(len, columns.values())}) != 1:
+            settings.fail(f"{key} has columns of different lengths; needed are {needed}")
+        return Table(columns, f"{settings.where} {key}")
+
+
+_ENDS = "[lowest, highest]"
+
+
+@dataclass(frozen=True)
+class _SimulatorTable:
+    """The table [simulator], but for the file `table`."""
+
+    slip: Annotated[
+        tuple[float, float],
+        Numbers(f"{_ENDS}, between -1 and 1", 2, -MOST_SLIP, MOST_SLIP, rising=True),
+    ]
+    load: Annotated[
+        tuple[float, float],
+        Key("load_N"),
+        Numbers(f"{_ENDS}, above zero", 2, LEAST_LOAD, MOST_LOAD, rising=True),
+    ]
+    runs: Annotated[Table | None, RunsWithin()] = None
+
+
 def take_simulator(settings: Settings, gear: Gear) -> Simulator:
     """Read the table [simulator]; raises `InputError` for what is missing, unknown or wrong."""
-    own_runs = _take_runs(settings) if "runs" in settings else None
-    runs = settings.file("table") if own_runs is None else None
-    called, command = settings.text("python", ""), settings.text("command", "")
-    if called and command:
-        settings.fail("python and command are both given; needed is one of them")
-    file, _, function = called.rpartition(":")
-    if called and not file:
-        settings.fail(f"python is {called!r}; needed is FILE.py:FUNCTION")
-    try:
-        python = settings.files.path(file) if called else None
-        if command:
-            settings.files.path(command.split()[0])
-    except InputError as error:
-        settings.fail(f"{'python' if called else 'command'} {error}")
-    if command and not ("{design}" in command and "{runs}" in command):
-        settings.fail(
-            f"command is {command!r}; it must contain {{design}}, the table that it reads, and "
-            "{runs}, the table that it writes"
-        )
-    ends = Numbers("[lowest, highest]", 2, rising=True)
-    slip, load = (ends.take(settings, key, "") for key in ("slip", "load_N"))
-    if not -1.0 < slip[0] < slip[1] < 1.0:
-        settings.fail("slip must lie between -1 and 1")
-    if load[0] <= 0.0:
-        settings.fail("load_N must be above zero")
-    settings.finish()
-    return Simulator(
-        runs, python, function, command, slip, load, settings.files.folder, gear, runs_read=own_runs
-    )
-
-
-def _take_runs(settings: Settings) -> Table:
-    """The runs of the key `runs`, a list of numbers for each column."""
-    needed = "lists of as many numbers, by column"
-    found = settings.take("runs", dict, needed)
-    try:
-        columns = {key: np.asarray(values, dtype=np.float64) for key, values in found.items()}
-    except (TypeError, ValueError):
-        settings.fail(f"runs has a value that is no number; needed are {needed}")
-    if len({x.shape for x in columns.values()}) != 1 or next(iter(columns.values())).ndim != 1:
-        settings.fail(f"runs has columns of different lengths; needed are {needed}")
-    return Table(columns, f"{settings.where} runs")
+    runs = None if "runs" in settings else settings.file("table")
+    own = take_declared(_SimulatorTable, settings)
+    return Simulator(runs, own.slip, own.load, gear, runs_read=own.runs)
 
 
 def emulated(
@@ -138,7 +123,7 @@ def emulated(
         if not simulator.runs.is_file():
             raise InputError(
                 f"{simulator.runs}: there is no such file; `soilml plan runs` proposes the runs "
-                "of [simulator], and makes them where it has python or command"
+                "of [simulator]"
             )
         table = read_runs(simulator.runs)
     gear, emulator = emulator_of(table, simulator.gear, prior)

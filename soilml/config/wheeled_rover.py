@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
-from soilml.io.declared_settings import Key, Numbers, take_declared
+from soilml.io.declared_settings import Key, Numbers, named_tables, take_declared
 from soilml.io.toml_settings import Settings
 from soilml.parameters import Parameter, check_number
 from soilml.physics.gears.rigid_wheel import RigidWheel
@@ -23,6 +23,32 @@ GRAVITY = {"earth": 9.80665, "moon": 1.62, "mars": 3.71}
 LEAST_LOAD_SHARE = 1e-3
 
 
+_GRAVITY = Parameter("m/s^2", 0.01, 30.0, "gravity")
+_NEEDED = "a number in m/s^2, or one of earth, moon, mars"
+
+
+def read_gravity(value: float | str, where: str = "") -> float:
+    """Gravity (m/s^2) from a number or a name; raises `InputError` for another."""
+    where = f"{where}: " if where else ""
+    if isinstance(value, str):
+        if value.lower() in GRAVITY:
+            return GRAVITY[value.lower()]
+        try:
+            value = float(value)
+        except ValueError:
+            raise InputError(f"{where}gravity is {value!r}; needed is {_NEEDED}") from None
+    check_number(f"{where}gravity", _GRAVITY, value)
+    return float(value)
+
+
+class GravityByName:
+    """Gravity as a number or by name."""
+
+    def take(self, settings: Settings, key: str, kind: str) -> float:
+        """Gravity, m/s^2."""
+        return read_gravity(settings.take(key, (int, float, str), _NEEDED), settings.where)
+
+
 @dataclass(frozen=True)
 class RoverWheel:
     """A wheel: place of its contact (m; forward, to the left), and its gear's name or None."""
@@ -32,9 +58,31 @@ class RoverWheel:
     gear: str | None = None
 
 
+_LENGTHS = "in m, up to 100"
+
+
+@dataclass(frozen=True)
+class _WheelTable:
+    """A wheel of [rover.wheels]."""
+
+    position: Annotated[tuple[float, float], Numbers(f"[forward, left] {_LENGTHS}", 2, -100, 100)]
+    gear: str = ""
+
+
+class WheelsByName:
+    """The tables [rover.wheels.NAME]."""
+
+    def take(self, settings: Settings, key: str, kind: str) -> dict[str, RoverWheel]:
+        """The wheels by name."""
+        found = named_tables(settings, key, _WheelTable)
+        return {n: RoverWheel(*wheel.position, wheel.gear or None) for n, wheel in found.items()}
+
+
 @dataclass(frozen=True)
 class WheeledRover:
     """Driven wheels under a rigid body; all rims have one speed, and so all wheels one slip.
+
+    Raises `InputError` for fewer than two wheels, and a centre of mass below the ground.
 
     Examples
     --------
@@ -46,11 +94,26 @@ class WheeledRover:
     [38.4, 55.5]
     """
 
-    mass: float  # Of the whole rover, kg
+    mass: Annotated[float, Parameter("kg", 0.01, 1e5, "mass of the whole rover")]
     # Forward, to the left, and above the ground, m, in the frame of the wheels
-    centre_of_mass: tuple[float, float, float]
-    wheels: Mapping[str, RoverWheel]  # By name
-    gravity: float = GRAVITY["earth"]  # m/s^2
+    centre_of_mass: Annotated[
+        tuple[float, float, float], Numbers(f"[forward, left, height] {_LENGTHS}", 3, -100, 100)
+    ]
+    wheels: Annotated[Mapping[str, RoverWheel], WheelsByName()]
+    gravity: Annotated[float, GravityByName()] = GRAVITY["earth"]  # m/s^2
+
+    def __post_init__(self) -> None:
+        """Raise `InputError` for a rover that cannot stand."""
+        if self.centre_of_mass[2] < 0.0:
+            raise InputError(
+                f"centre_of_mass is {list(self.centre_of_mass)!r}; its height above the ground "
+                "cannot be negative"
+            )
+        if len(self.wheels) < 2:
+            raise InputError(
+                "[rover.wheels] needs two wheels or more, each as "
+                "front-left = { position = [0.4, 0.3] }"
+            )
 
     @property
     def weight(self) -> float:
@@ -128,66 +191,6 @@ class WheeledRover:
         }
 
 
-_GRAVITY = Parameter("m/s^2", 0.01, 30.0, "gravity")
-_NEEDED = "a number in m/s^2, or one of earth, moon, mars"
-_LENGTHS = "in m, up to 100"
-
-
-def read_gravity(value: float | str, where: str = "") -> float:
-    """Gravity (m/s^2) from a number or a name; raises `InputError` for another."""
-    where = f"{where}: " if where else ""
-    if isinstance(value, str):
-        if value.lower() in GRAVITY:
-            return GRAVITY[value.lower()]
-        try:
-            value = float(value)
-        except ValueError:
-            raise InputError(f"{where}gravity is {value!r}; needed is {_NEEDED}") from None
-    check_number(f"{where}gravity", _GRAVITY, value)
-    return float(value)
-
-
-class GravityByName:
-    """Gravity as a number or by name."""
-
-    def take(self, settings: Settings, key: str, kind: str) -> float:
-        """Gravity, m/s^2."""
-        return read_gravity(settings.take(key, (int, float, str), _NEEDED), settings.where)
-
-
-@dataclass(frozen=True)
-class _WheelTable:
-    """A wheel of [rover.wheels]."""
-
-    position: Annotated[tuple[float, float], Numbers(f"[forward, left] {_LENGTHS}", 2, -100, 100)]
-    gear: str = ""
-
-
-@dataclass(frozen=True)
-class _RoverTable:
-    """The table [rover]."""
-
-    mass: Annotated[float, Parameter("kg", 0.01, 1e5, "mass of the whole rover")]
-    centre_of_mass: Annotated[
-        tuple[float, float, float], Numbers(f"[forward, left, height] {_LENGTHS}", 3, -100, 100)
-    ]
-    wheels: dict[str, _WheelTable] = field(default_factory=dict)
-    gravity: Annotated[float, GravityByName()] = GRAVITY["earth"]
-
-    def __post_init__(self) -> None:
-        """Raise `InputError` for a rover that cannot stand."""
-        if self.centre_of_mass[2] < 0.0:
-            raise InputError(
-                f"centre_of_mass is {list(self.centre_of_mass)!r}; its height above the ground "
-                "cannot be negative"
-            )
-        if len(self.wheels) < 2:
-            raise InputError(
-                "[rover.wheels] needs two wheels or more, each as "
-                "front-left = { position = [0.4, 0.3] }"
-            )
-
-
 def take_rover(settings: Settings, gears: Mapping[str, Model]) -> WheeledRover:
     """Read `[rover]`: mass, centre_of_mass, gravity and [rover.wheels].
 
@@ -201,8 +204,8 @@ def take_rover(settings: Settings, gears: Mapping[str, Model]) -> WheeledRover:
             "a rover of four equal wheels is for soilml paper climb; here each wheel stands in "
             "[rover.wheels], as front-left = { position = [0.4, 0.3] }"
         )
-    found = take_declared(_RoverTable, settings)
-    for name, wheel in found.wheels.items():
+    rover = take_declared(WheeledRover, settings)
+    for name, wheel in rover.wheels.items():
         if wheel.gear and wheel.gear not in gears:
             known = ", ".join(filter(None, gears)) or "none; write [gears.NAME] in place of [gear]"
             settings.fail(f"wheel {name}: gear is {wheel.gear!r}; gears of this file: {known}")
@@ -213,8 +216,7 @@ def take_rover(settings: Settings, gears: Mapping[str, Model]) -> WheeledRover:
                 "wheels that touch the ground at one place each; leave [rover] out, and ask for "
                 "one gear with --load"
             )
-    wheels = {n: RoverWheel(*w.position, w.gear or None) for n, w in found.wheels.items()}
-    return WheeledRover(found.mass, found.centre_of_mass, wheels, found.gravity)
+    return rover
 
 
 @dataclass(frozen=True)

@@ -100,8 +100,7 @@ def _rover(rover: WheeledRover) -> Content:
         name: Inline(position=[w.forward, w.left], **({"gear": w.gear} if w.gear else {}))
         for name, w in rover.wheels.items()
     }
-    own = {"mass": rover.mass, "centre_of_mass": list(rover.centre_of_mass)}
-    return own | {"gravity": rover.gravity, "wheels": wheels}
+    return settings_of(rover) | {"wheels": wheels}
 
 
 def _explanation(case: Case, one: CaseExplanation) -> Content:

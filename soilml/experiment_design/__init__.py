@@ -5,16 +5,15 @@ from soilml.experiment_design.design import (
     CandidateGrid,
     CandidateRow,
     RatedRow,
-    advise,
     candidate_grid,
+    rate_rows,
 )
+from soilml.experiment_design.next_rows import advise
 from soilml.experiment_design.parameter_samples import (
     ParameterSamples,
-    samples_of_moments,
     samples_of_prior,
     samples_of_rows,
 )
-from soilml.experiment_design.presentation import is_identified
 
 __all__ = [
     "Advice",
@@ -24,8 +23,7 @@ __all__ = [
     "RatedRow",
     "advise",
     "candidate_grid",
-    "is_identified",
-    "samples_of_moments",
+    "rate_rows",
     "samples_of_prior",
     "samples_of_rows",
 ]

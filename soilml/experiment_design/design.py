@@ -21,6 +21,8 @@ from soilml.experiment_design.expected_variance import (
 from soilml.experiment_design.parameter_samples import ParameterSamples
 from soilml.fitting.levels import replicate_rows
 from soilml.physics.operating_point import MOST_SLIP, Operating
+from soilml.quantities import column
+from soilml.remarks import Remark
 from soilml.results import Result
 
 if TYPE_CHECKING:
@@ -33,18 +35,18 @@ LOADS = 5
 LIGHTER, HEAVIER = 0.5, 2.0
 #: Most operating points whose repetition is rated.
 REPETITIONS = 6
+MOST_POINTS = 1000  # Most operating points of a grid
 Floats32 = NDArray[np.float32]
 NO_ROWS = np.zeros((1, 1), np.float32)  # Log likelihood of no rows
 
 
 @dataclass(frozen=True)
 class CandidateRow:
-    """A row to measure: slip, load (N) and channels; a repetition has a measured point."""
+    """A row to measure: slip, load (N) and channels."""
 
     slip: float
     load: float
     channels: tuple[str, ...]
-    is_repetition: bool = False
 
     @property
     def description(self) -> str:
@@ -68,6 +70,11 @@ class CandidateGrid:
         for load in self.loads:
             if not 0.0 < load < 1e7:
                 raise InputError(f"load {load:g} N cannot be driven; needed is one inside 0..1e7")
+        if len(self.slips) * len(self.loads) > MOST_POINTS:
+            raise InputError(
+                f"{len(self.slips)} slips times {len(self.loads)} loads are too many to try; at "
+                f"most {MOST_POINTS} operating points are possible"
+            )
 
     def candidates(self, channels: Sequence[tuple[str, ...]]) -> list[CandidateRow]:
         """All combinations of slip, load and channels."""
@@ -113,7 +120,7 @@ def repeated_points(measured: Operating, channels: tuple[str, ...] = ()) -> list
     if len(points) > REPETITIONS:
         kept = np.linspace(0, len(points) - 1, REPETITIONS).round().astype(int)
         points = [points[i] for i in kept]
-    return [CandidateRow(*point, channels=channels, is_repetition=True) for point in points]
+    return [CandidateRow(*point, channels=channels) for point in points]
 
 
 @dataclass(frozen=True)
@@ -151,6 +158,10 @@ class Advice(Result):
         all rows so far.
     excluded_points
         Number of grid points at which the wheel might not be carried.
+    measured
+        Operating points of earlier rows; None without.
+    remarks
+        What to know of the rows and of the ratings.
     """
 
     names: tuple[str, ...]
@@ -159,6 +170,8 @@ class Advice(Result):
     repetitions: tuple[RatedRow, ...]
     sequence: tuple[RatedRow, ...]
     excluded_points: int
+    measured: Operating | None = None
+    remarks: tuple[Remark, ...] = ()
 
     def with_channels(self, channels: tuple[str, ...]) -> tuple[RatedRow, ...]:
         """The choices that measure these channels."""
@@ -185,10 +198,34 @@ class Advice(Result):
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each candidate, the best first, with the fractions that it leaves."""
-        from soilml.experiment_design.presentation import advice_columns
-
         ranked = sorted(self.choices, key=lambda c: c.overall)
-        return advice_columns(self, [(str(i), c) for i, c in enumerate(ranked, 1)])
+        return self._columns([(str(i), c) for i, c in enumerate(ranked, 1)])
+
+    def best_columns(self) -> dict[str, Any]:
+        """A row for each best candidate: in all, for each parameter, repeated, of the sequence."""
+        rows = [("best in all", self.best())]
+        rows += [
+            (f"best in all with {own[1]}", self.best(None, own)) for own in self.channel_sets[1:]
+        ]
+        rows += [(f"best for {name}", self.best(name)) for name in self.names]
+        if (repeat := self.best_repetition()) is not None:
+            rows.append(("best repeat", repeat))
+        if (count := len(self.sequence)) > 1:
+            rows += [(f"row {i} of {count}", c) for i, c in enumerate(self.sequence, 1)]
+        return self._columns(rows)
+
+    def _columns(self, rows: Sequence[tuple[str, RatedRow]]) -> dict[str, Any]:
+        choices = [choice for _, choice in rows]
+        columns: dict[str, Any] = {
+            "row": [why.replace("_", " ") for why, _ in rows],
+            "channels": [" + ".join(map(column, c.candidate.channels)) for c in choices],
+            "slip": np.asarray([c.candidate.slip for c in choices]),
+            "load_N": np.asarray([c.candidate.load for c in choices]),
+        }
+        for i, name in enumerate(self.names):
+            columns[f"{name}_left"] = np.asarray([c.remaining_fraction[i] for c in choices])
+        columns["all_left"] = np.asarray([c.overall for c in choices])
+        return columns
 
 
 def best_row(choices: Sequence[RatedRow], names: Sequence[str], name: str | None) -> RatedRow:
@@ -199,7 +236,7 @@ def best_row(choices: Sequence[RatedRow], names: Sequence[str], name: str | None
     return min(choices, key=lambda c: float(c.remaining_fraction[i]))
 
 
-def advise(
+def rate_rows(
     case: Case,
     samples: ParameterSamples,
     grid: CandidateGrid,
@@ -207,9 +244,6 @@ def advise(
     measured: Operating | None = None,
     count: int = 1,
     covariates: Mapping[str, float] | None = None,
-    channels: Sequence[str] | None = None,
-    parameters: Sequence[str] | None = None,
-    current_fraction: Floats | None = None,
     outcome_count: int = OUTCOMES,
 ) -> Advice:
     """Rate every slip, load and set of channels by the variance expected to remain after a row.
@@ -223,7 +257,7 @@ def advise(
     case
         Model, soil, priors and noise.
     samples
-        What is known of the parameters: samples of the prior, of a posterior, or of moments.
+        What is known of the parameters: samples of the prior, or of a posterior.
     grid
         Slips and loads (N) that can be driven.
     measured
@@ -232,13 +266,6 @@ def advise(
         Length of the sequence.
     covariates
         Further fields of `Operating`, the same for all candidates.
-    channels
-        Channels that can be measured; by default those with declared noise.
-    parameters
-        Parameters that are rated; by default all of the samples.
-    current_fraction
-        Remaining fraction (p,) of `parameters` where it is known more precisely than from the
-        samples.
     outcome_count
         Number of simulated readings of each candidate.
 
@@ -260,11 +287,6 @@ def advise(
     slip, load = np.asarray(list(index)).T
     others = {key: np.full(len(index), value) for key, value in (covariates or {}).items()}
     ahead = predicted_readings(case, samples, Operating(slip=slip, load=load, **others))
-    paths = [f.path for f in samples.free]
-    names = tuple(parameters or paths)
-    columns = [paths.index(name) for name in names]
-    sampled = samples.remaining_fraction[columns]
-    current = sampled if current_fraction is None else current_fraction
 
     def log_likelihood(row: CandidateRow, outcomes: ExpectedVariance) -> Floats32:
         return outcomes.log_likelihood(ahead, row.channels, index[row.slip, row.load])
@@ -275,14 +297,16 @@ def advise(
         earlier: Floats32 = NO_ROWS,
     ) -> list[RatedRow]:
         """Candidates that can be driven, after rows with the log likelihood `earlier`."""
-        rated = []
-        for row in candidates:
-            if ahead.drivable[index[row.slip, row.load]]:
-                left = outcomes.remaining_variance(log_likelihood(row, outcomes) + earlier)[columns]
-                rated.append(RatedRow(row, current / sampled * np.sqrt(left)))
-        return rated
+        return [
+            RatedRow(
+                row, np.sqrt(outcomes.remaining_variance(log_likelihood(row, outcomes) + earlier))
+            )
+            for row in candidates
+            if ahead.drivable[index[row.slip, row.load]]
+        ]
 
-    sets = channel_sets([c for c in ahead.channels if channels is None or c in channels])
+    names = tuple(f.path for f in samples.free)
+    sets = channel_sets(ahead.channels)
     outcomes = expected_variance(samples, len(ahead.channels), outcome_count)
     first = rate(grid.candidates(sets[:1]), outcomes)
     if not first:
@@ -299,9 +323,10 @@ def advise(
     repetitions = [] if measured is None else repeated_points(measured, sets[0])
     return Advice(
         names=names,
-        current_fraction=current,
+        current_fraction=samples.remaining_fraction,
         choices=(*first, *rate(grid.candidates(sets[1:]), outcomes)),
         repetitions=tuple(rate(repetitions, outcomes)),
         sequence=tuple(sequence),
         excluded_points=len(grid.slips) * len(grid.loads) - len(first),
+        measured=measured,
     )

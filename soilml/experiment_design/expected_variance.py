@@ -163,14 +163,7 @@ class ExpectedVariance:
         References: Lindley, Annals of Mathematical Statistics 27, 1956. Chaloner and Verdinelli,
         Statistical Science 10, 1995, section 2.
         """
-        expected = self.variance_of(log_likelihood, self.samples.standardised)
-        return np.asarray(np.minimum(expected, self.samples.remaining_fraction**2))
-
-    def variance_of(self, log_likelihood: Floats32, theta: Floats) -> Floats:
-        """The same (q,) of any functions of the parameters, theta (n, q), in their units squared.
-
-        Functions of large mean lose digits: give them less their mean.
-        """
+        theta = self.samples.standardised
         weights = self._leave_one_out_weights(log_likelihood)
         own = theta[self.index]
         columns = np.column_stack([np.ones(len(theta)), theta, theta**2])
@@ -182,7 +175,8 @@ class ExpectedVariance:
         mean[isolated] = own[isolated]
         mean_square[isolated] = mean[isolated] ** 2
         within = mean_square - mean**2
-        return np.asarray(0.5 * (within + (own - mean) ** 2).mean(axis=0))
+        expected = 0.5 * (within + (own - mean) ** 2).mean(axis=0)
+        return np.asarray(np.minimum(expected, self.samples.remaining_fraction**2))
 
     def _leave_one_out_weights(self, log_likelihood: Floats32) -> Floats32:
         """Posterior weights (j, n) up to a factor of each outcome, zero for its own sample."""

@@ -1,90 +1,26 @@
-"""What is known of a soil after its rows, and the rows that are worth measuring next."""
+"""The rows that are worth measuring next, after those of a table or by the prior."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.given_case import GivenCase, as_case
 from soilml.config.measurement_noise import Noise
-from soilml.errors import FitError, InputError, SoilmlError
-from soilml.experiment_design import design
-from soilml.experiment_design.expected_answers import advise_by_answers, trained_case
-from soilml.experiment_design.parameter_samples import (
-    ParameterSamples,
-    samples_of_prior,
-    samples_of_rows,
-)
-from soilml.experiment_design.presentation import next_row_remarks
+from soilml.experiment_design.design import Advice, candidate_grid, rate_rows
+from soilml.experiment_design.parameter_samples import samples_of_prior, samples_of_rows
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.fit import Fit
 from soilml.io.read_table import Rows, as_table
-from soilml.io.table import Table
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.quantities import column
 from soilml.remarks import Remark
 
-if TYPE_CHECKING:
-    from soilml.onboard.estimator import Estimator
-
 COUNT = 3  # Default number of rows in the sequence
-#: Samples and simulated readings of an advice that accompanies a result: takes half a second.
-QUICK_SAMPLES, QUICK_OUTCOMES = 768, 128
-SEQUENCE_LENGTH = 2  # Rows in the planned sequence of such an advice
-
-
-@dataclass(frozen=True)
-class SoilKnowledge:
-    """Samples of the soil's parameters by the prior, or after rows.
-
-    case: With the noise of the rows' columns where it declares none.
-    measured: Operating points of the rows; None without.
-    loads: Loads of the rows, N (rows,); empty without.
-    notes: What to know of the rows.
-    """
-
-    case: Case
-    samples: ParameterSamples
-    measured: Operating | None
-    loads: Floats
-    notes: tuple[Remark, ...]
-
-
-def known_soil(
-    case: Case, rows: Rows | None, free: Sequence[str] | None = None, exact_model: bool = False
-) -> SoilKnowledge:
-    """What is known after rows; by the prior without.
-
-    Raises `InputError`, `TableError` and `FitError` as `identify` does.
-    """
-    selected = select_free(case, free)
-    if rows is None:
-        return SoilKnowledge(case, samples_of_prior(selected, case=case), None, np.empty(0), ())
-    readings = usable_readings(case, as_table(rows))
-    case, taken = _with_noise_of_rows(case, readings)
-    samples = samples_of_rows(case, readings, selected, exact_model=exact_model)
-    notes = (*taken, *readings.notes)
-    return SoilKnowledge(case, samples, readings.at, readings.row_load, notes)
-
-
-def _with_noise_of_rows(case: Case, readings: Readings) -> tuple[Case, list[Remark]]:
-    """The case with the noise of the rows' columns where it declares none: their median."""
-    noise, notes = dict(case.noise), []
-    for i, name in enumerate(readings.channels):
-        key, own = column(name), readings.channel == i
-        if key not in noise and key not in readings.undeclared:
-            std = float(np.median(readings.std[own]))
-            noise[key] = Noise(constant=std)
-            text = f"the noise of further {key} is taken from {key}_std: {std:.3g}"
-            notes.append(Remark("noise-of-rows", text, (key,), "note"))
-    return replace(case, noise=noise), notes
 
 
 def advise(
@@ -96,7 +32,7 @@ def advise(
     loads: Sequence[float] | None = None,
     count: int = COUNT,
     exact_model: bool = False,
-) -> design.Advice:
+) -> Advice:
     """The rows that are worth measuring next, by the variance expected to remain after them.
 
     Parameters
@@ -124,89 +60,51 @@ def advise(
     InputError, TableError, FitError
         As `identify`; also without loads where there are no rows, and without declared noise.
     """
-    known = known_soil(
-        as_case(case, with_bias=False, with_explanations=False), rows, free, exact_model
-    )
-    grid = design.candidate_grid(slips, loads, known.loads)
-    covariates = {} if known.measured is None else mean_covariates(known.measured)
-    return design.advise(
-        known.case,
-        known.samples,
-        grid,
-        measured=known.measured,
-        count=count,
-        covariates=covariates,
-    )
-
-
-def advice_after_fit(
-    case: Case, table: Table, free: Sequence[str] | None, fit: Fit
-) -> design.Advice | None:
-    """Advice after the posterior method gave `fit`; None where none is possible.
-
-    That is the case where [noise] declares no channel, where no candidate is known to be feasible,
-    and where several gears were driven.
-    """
-    if case.gears:
-        return None
-    try:
-        readings = usable_readings(case, table)
-        selected = select_free(case, free)
-        samples = samples_of_rows(case, readings, selected, QUICK_SAMPLES, found=fit.samples)
-        return design.advise(
+    case = as_case(case, with_bias=False, with_explanations=False)
+    selected = select_free(case, free)
+    if rows is None:
+        samples = samples_of_prior(selected, case=case)
+        found = rate_rows(case, samples, candidate_grid(slips, loads), count=count)
+        notes: list[Remark] = []
+    else:
+        readings = usable_readings(case, as_table(rows))
+        case, notes = _with_noise_of_rows(case, readings)
+        notes += readings.notes
+        found = rate_rows(
             case,
-            samples,
-            design.candidate_grid(None, None, readings.row_load),
+            samples_of_rows(case, readings, selected, exact_model=exact_model),
+            candidate_grid(slips, loads, readings.row_load),
             measured=readings.at,
-            count=SEQUENCE_LENGTH,
-            covariates=mean_covariates(readings.at),
-            current_fraction=np.asarray([fit.remaining_fraction[f.path] for f in samples.free]),
-            outcome_count=QUICK_OUTCOMES,
+            count=count,
+            covariates=_mean_covariates(readings.at),
         )
-    except (FitError, InputError):
-        return None
+    if case.states_model_error:
+        which = "[discrepancy]" if case.remainder is None else "error of the [remainder]"
+        text = f"the {which} of a next row counts as independent of that of other rows: "
+        notes.append(Remark("independent-discrepancy", f"{text}repetitions are overrated"))
+    if found.excluded_points:
+        text = (
+            f"{found.excluded_points} operating points are excluded: a twentieth or more of the "
+            "posterior samples does not carry the wheel"
+        )
+        notes.append(Remark("not-carried", text))
+    return replace(found, remarks=tuple(notes))
 
 
-def advice_of_file(
-    estimator: Estimator,
-    mean: Floats,
-    covariance: Floats,
-    readings: Mapping[str, Floats],
-    box: Mapping[str, tuple[float, float]] | None = None,
-) -> design.Advice | None:
-    """Advice after an estimate, (q,) and (q, q), of readings (rows,); None where none is possible.
-
-    What a next row leaves is what the file itself answers with that row, within the narrower prior
-    `box` if there is one: its errors of sensors and of the model are in the expectation as they are
-    in the answer. Model, prior and noise of simulated readings are those of the recipe in the file;
-    slips, loads and sensors are those of its training. None where the recipe has what a case lacks:
-    sensor bias, vibration, speed, or slip as a target.
-    """
-    trained = trained_case(estimator)
-    if trained is None:
-        return None
-    case, ranges = trained
-    try:
-        return advise_by_answers(estimator, case, ranges, mean, covariance, readings, box or {})
-    except (SoilmlError, ValueError):  # LinAlgError is one: no covariance, or none of this case
-        return None
+def _with_noise_of_rows(case: Case, readings: Readings) -> tuple[Case, list[Remark]]:
+    """The case with the noise of the rows' columns where it declares none: their median."""
+    noise, notes = dict(case.noise), []
+    for i, name in enumerate(readings.channels):
+        key, own = column(name), readings.channel == i
+        if key not in noise and key not in readings.undeclared:
+            std = float(np.median(readings.std[own]))
+            noise[key] = Noise(constant=std)
+            text = f"the noise of further {key} is taken from {key}_std: {std:.3g}"
+            notes.append(Remark("noise-of-rows", text, (key,), "note"))
+    return replace(case, noise=noise), notes
 
 
-def advice_after_estimate(
-    estimator: Estimator,
-    mean: Floats,
-    covariance: Floats,
-    readings: Mapping[str, Floats],
-    box: Mapping[str, tuple[float, float]] | None = None,
-) -> list[Remark]:
-    """Remarks on the next measurement; arguments as for `advice_of_file`."""
-    advice = advice_of_file(estimator, mean, covariance, readings, box)
-    if advice is None:
-        return []
-    return next_row_remarks(advice, "this row" if np.size(readings["slip"]) == 1 else "these rows")
-
-
-def mean_covariates(at: Operating) -> dict[str, float]:
+def _mean_covariates(at: Operating) -> dict[str, float]:
     """Means of the covariates of measured rows, which are assumed for the next row."""
     values = {field: getattr(at, field) for field in COVARIATES}
     return {field: float(np.mean(value)) for field, value in values.items() if value is not None}

@@ -1,10 +1,9 @@
-"""Weighted samples of the parameters: of a prior, of a posterior, or from moments."""
+"""Weighted samples of the parameters: of a prior, or of a posterior."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import erf, sqrt
 
 import numpy as np
 
@@ -14,9 +13,7 @@ from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.readings import Readings
 from soilml.identification.averaged import soil_samples
 from soilml.identification.condensing import condensed
-from soilml.identification.posterior import PosteriorSamples, prior_fractions
-from soilml.numerics.maximum_entropy import prior_quantiles
-from soilml.numerics.quantiles import latin_hypercube
+from soilml.identification.posterior import prior_fractions
 
 SAMPLES = 2048  # Default number of samples
 
@@ -64,47 +61,14 @@ def samples_of_rows(
     readings: Readings,
     free: Sequence[Coordinate],
     count: int = SAMPLES,
-    found: PosteriorSamples | None = None,
     exact_model: bool = False,
 ) -> ParameterSamples:
     """Samples of the soil that explains rows, averaged over explanations as by `identify`.
 
-    With `exact_model`, those of the exact posterior. `found` are samples that were drawn before.
-    Raises `FitError` as `identify` does, and where noise is not declared.
+    With `exact_model`, those of the exact posterior. Raises `FitError` as `identify` does, and
+    where noise is not declared.
     """
-    if found is None:
-        found = soil_samples(case, condensed(case, readings, free), free, exact_model)
+    found = soil_samples(case, condensed(case, readings, free), free, exact_model)
     index, multiplicity = np.unique(found.equally_weighted(count), return_counts=True)
     weights = multiplicity / multiplicity.sum()
     return ParameterSamples(tuple(free), found.sample.u[index], weights, found.noise_scale)
-
-
-def samples_of_moments(
-    free: Sequence[Coordinate],
-    names: Sequence[str],
-    mean: Floats,
-    covariance: Floats,
-    count: int = SAMPLES,
-) -> ParameterSamples:
-    """Samples with a mean (q,) and covariance (q, q) of the parameters `names`, inside the priors.
-
-    Marginals are the maximum-entropy densities of `prior_quantiles`, joined by a Gaussian copula;
-    parameters that are not named have their prior. An approximation: moments do not determine a
-    posterior that is far from Gaussian.
-    """
-    rng = np.random.default_rng(0)
-    u = latin_hypercube(count, len(free), rng)
-    std = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.outer(std, std)
-    # a thousandth of independence keeps a degenerate correlation positive definite
-    factor = np.linalg.cholesky(0.999 * correlation + 0.001 * np.eye(len(names)))
-    normal = rng.standard_normal((count, len(names))) @ factor.T
-    probability = 0.5 * (1.0 + np.vectorize(erf)(normal / sqrt(2.0)))
-    column: Mapping[str, int] = {f.path: i for i, f in enumerate(free)}
-    for k, name in enumerate(names):
-        if name in column:
-            i = column[name]
-            u[:, i] = prior_quantiles(
-                free[i].prior, float(mean[k]), float(std[k]), probability[:, k]
-            )
-    return ParameterSamples(tuple(free), u, np.full(count, 1.0 / count))

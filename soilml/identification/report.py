@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -25,10 +25,11 @@ _NOTATION = (
     ("left of prior", "width of the estimate over that of the prior; blank without one."),
 )
 _LEAST_SHARE = 0.01  # Probability of an explanation below which it is not listed
+TO_NEXT = "soilml plan next proposes the rows to measure next"
 TO_GAP = "soilml gap finds what a model lacks"
 
 
-def fit_report(fit: Fit, next_rows: Sequence[str] = (), title: str = "Soil") -> Report:
+def fit_report(fit: Fit, title: str = "Soil") -> Report:
     """The report of one fit: verdict, soil, readings beside the model, what limits it."""
     details = []
     if fit.explanations:
@@ -58,7 +59,7 @@ def fit_report(fit: Fit, next_rows: Sequence[str] = (), title: str = "Soil") -> 
         ),
         pictures=pictures or [_intervals({"": fit}).picture()],
         remarks=fit.warnings,
-        next_steps=[*next_rows, TO_GAP] if fit.fits else [TO_GAP],
+        next_steps=[TO_NEXT, TO_GAP] if fit.fits and fit.undetermined else [TO_GAP],
         details=details,
         status=status if fit.fits else "the model does not fit",
         tone="bad" if not fit.fits else "good" if known == len(fit.names) else "warn",

@@ -93,9 +93,8 @@ class Estimate(Result):
         sensors that have the errors that are declared or usual; the interval allows for errors of
         the model. A unit, a sensor, the wheel or the model is then wrong. One in a hundred sound
         sets is flagged; where it is False, nothing is proven.
-    exact_misfit, exact_probability : ndarray, shape (...)
-        The misfit with the exact model, and the share of sound sets with a larger one, which is
-        calibrated at 1 %; else NaN.
+    exact_misfit : ndarray, shape (...)
+        The misfit with the exact model; else NaN.
     rows_used, rows_set_aside : ndarray of int, shape (...)
         Rows in the training range, which the estimate uses, and rows out of it, which it does not.
         Rows that repeat another one are in neither.
@@ -128,7 +127,6 @@ class Estimate(Result):
     misfit: Floats = field(default_factory=lambda: _NOT_GIVEN)
     disagrees: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
     exact_misfit: Floats = field(default_factory=lambda: _NOT_GIVEN)
-    exact_probability: Floats = field(default_factory=lambda: _NOT_GIVEN)
     rows_used: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
     rows_set_aside: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
     reason: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
@@ -137,7 +135,7 @@ class Estimate(Result):
     #: The fields that are arrays with the leading dimensions of the readings.
     ARRAYS: ClassVar[tuple[str, ...]] = (
         *("mean", "std", "covariance", "low", "high", "in_range"),
-        *("misfit", "disagrees", "exact_misfit", "exact_probability"),
+        *("misfit", "disagrees", "exact_misfit"),
         *("rows_used", "rows_set_aside", "reason", "load"),
     )
 
@@ -145,7 +143,7 @@ class Estimate(Result):
         """Fields that are not given are those of single readings."""
         inside = np.asarray(self.in_range)
         made: Any = dict.fromkeys(
-            ("misfit", "exact_misfit", "exact_probability", "load"),
+            ("misfit", "exact_misfit", "load"),
             lambda: np.full(inside.shape, np.nan),
         )
         made |= {"disagrees": lambda: np.zeros(inside.shape, dtype=bool)}

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NoReturn, final, overload
+from typing import Any, NoReturn, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.exact_check import with_exact_check
-from soilml.onboard.features import flatten_readings, readings_of_frame, without_copies
+from soilml.onboard.features import flatten_readings, without_copies
 from soilml.onboard.gaussian_product import product_of_rows
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.memory import Memory, check_memory, memory_identity
@@ -41,7 +41,7 @@ class Estimator:
     """A trained model: soil parameters, or slip, from readings of a wheel.
 
     Call it for readings each by itself; use `run` for all readings of one soil, and `start` and
-    `step` for readings as they come.
+    `step` for readings as they come. Tables and data frames are for `soilml.estimate`.
 
     Attributes
     ----------
@@ -121,18 +121,11 @@ class Estimator:
         sets = self.sets.with_context(given, {} if noise is None else noise)
         return replace(self, sets=sets, prior=read_prior(self.metadata, sets.context_values))
 
-    @overload
-    def __call__(self, frame: None = None, /, **measured: Any) -> Estimate: ...
-    @overload
-    def __call__(self, frame: Any, /) -> Any: ...
-    def __call__(self, frame: Any = None, /, **measured: Any) -> Any:
+    def __call__(self, **measured: Any) -> Estimate:
         """Estimates from readings, each by itself, with the broadcast shape of the readings.
 
         Parameters
         ----------
-        frame : data frame of pandas
-            In place of `measured`: rows with columns such as load_N. Returned is then a frame with
-            the same index, as `Estimate.to_frame` has it.
         **measured : float or array_like
             Every quantity in `inputs`, in SI units; arrays broadcast.
 
@@ -151,10 +144,6 @@ class Estimator:
         >>> estimate.in_range
         array([ True,  True])
         """
-        if frame is not None:
-            sets_only = self.sets is not None and self.sets.sets_only
-            readings = readings_of_frame(frame, self.inputs, self._optional if sets_only else ())
-            return self(**readings).to_frame().set_axis(frame.index)
         if self.sets is not None and self.sets.sets_only:
             return self._rows_as_sets(self.sets, measured)
         flat, shape = flatten_readings(self.inputs, measured)
@@ -174,11 +163,7 @@ class Estimator:
             rows["load"].reshape(shape) if "load" in rows else None,
         )
 
-    @overload
-    def run(self, frame: None = None, /, **measured: Any) -> Estimate: ...
-    @overload
-    def run(self, frame: Any, /) -> Any: ...
-    def run(self, frame: Any = None, /, **measured: Any) -> Any:
+    def run(self, **measured: Any) -> Estimate:
         """One estimate from all readings (rows,) of one soil.
 
         Uses the set posterior where the file has one; where no soil of the prior is consistent with
@@ -190,9 +175,6 @@ class Estimator:
 
         Parameters
         ----------
-        frame : data frame of pandas
-            In place of `measured`: the rows of one soil, with columns such as load_N. Returned is
-            then a frame with a row for each quantity, as `Estimate.to_frame` has it.
         **measured : array_like, shape (rows,)
             Every quantity in `inputs`, in SI units. A set posterior also takes ``sinkage`` and
             ``drawbar_pull``, NaN in rows without them, and ``torque_std``, ``sinkage_std`` and
@@ -216,8 +198,6 @@ class Estimator:
         >>> f"{mean:.2f} +- {std:.2f} rad"
         '0.51 +- 0.07 rad'
         """
-        if frame is not None:
-            return self.run(**readings_of_frame(frame, self.inputs, self._optional)).to_frame()
         if self.sets is not None:
             rows = self._configured_sets.rows(measured)
             rows = without_copies(rows, READINGS)
@@ -234,14 +214,6 @@ class Estimator:
         if flat[0].size == 0:
             raise InputError("no reading given; needed is one or more")
         return product_of_rows(self(**without_copies(rows, self.inputs)))
-
-    @property
-    def _optional(self) -> list[str]:
-        """Readings that the set posterior also takes, and standard deviations of all readings."""
-        if self.sets is None:
-            return []
-        more = [name for name in OPTIONAL_READINGS if name in self.sets.noise]
-        return [*more, *(f"{name}_std" for name in (*self.inputs, *more))]
 
     def start(self) -> Memory:
         """The memory of a soil before its first reading; see `step`."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from soilml.errors import InputError
 from soilml.onboard.set_contract import Floats
-from soilml.quantities import QUANTITIES, column
+from soilml.quantities import QUANTITIES
 
 #: Quantities that a model can read, with the open interval of possible readings.
 READABLE: dict[str, tuple[float, float]] = {
@@ -124,24 +124,3 @@ def without_copies(rows: Mapping[str, Floats], readings: Sequence[str]) -> dict[
     table = np.stack([rows[name] for name in readings], axis=1)
     first = np.sort(np.unique(table, axis=0, return_index=True)[1])
     return {name: values[first] for name, values in rows.items()}
-
-
-def readings_of_frame(frame: Any, inputs: Sequence[str], optional: Sequence[str]) -> dict[str, Any]:
-    """Readings (rows,) by name from the columns of a data frame, such as load_N and load_N_std.
-
-    optional: Readings that are used where the frame has their columns; other columns are ignored.
-
-    Raises `InputError` for what is no data frame, and for a column that is missing.
-    """
-    if not hasattr(frame, "columns"):
-        given = type(frame).__name__
-        raise InputError(f"readings are {given}; needed are a data frame, or readings by name")
-    keys = {}
-    for name in (*inputs, *optional):
-        base = name.removesuffix("_std")
-        key = column(base) + ("_std" if base != name else "")
-        if key in frame.columns:
-            keys[name] = key
-        elif name in inputs:
-            raise InputError(f"the data frame lacks the column {key}")
-    return {name: np.asarray(frame[key], dtype=np.float64) for name, key in keys.items()}

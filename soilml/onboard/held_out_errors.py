@@ -74,17 +74,6 @@ class HeldOutErrors:
             found[key] = values.tolist() if exact else np.reshape(rounded, values.shape).tolist()
         return found
 
-    def repeated(self, count: int) -> tuple[Floats, Floats]:
-        """`repeat_std` and `repeat_coverage_factor` for a number of readings, each (q,).
-
-        Interpolated in the logarithm of the number; constant beyond the largest that was measured.
-        """
-        at, grid = np.log(count), np.log(self.repeats)
-        columns = np.concatenate([self.repeat_std, self.repeat_coverage_factor], axis=1).T
-        both = np.asarray([np.interp(at, grid, column) for column in columns])
-        std, factor = np.split(both, 2)
-        return std, factor
-
     def common_share(self) -> Floats:
         """Share (q,) of the error variance that readings of one soil at one slip have in common.
 

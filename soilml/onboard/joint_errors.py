@@ -57,19 +57,15 @@ class JointErrors:
     low: Floats
     high: Floats
 
-    def fuse(self, mean: Floats, std: Floats, ratio: Floats) -> tuple[Floats, Floats, Floats]:
+    def fuse(self, mean: Floats, std: Floats) -> tuple[Floats, Floats, Floats]:
         """Fused mean and standard deviation, and disagreement, (n,), of estimates (m, n).
 
-        mean, std (m, n): Estimates, or averages of the estimates of repeated readings.
-        ratio (m,): Standard deviation of each over that of a single reading: what independent noise
-            loses by repetition, the correlation of the rest gains.
+        The disagreement is the largest difference between two files, in standard deviations of that
+        difference.
         """
-        correlation = self.correlation
-        if (ratio != 1.0).any():
-            correlation = _positive(correlation / np.outer(ratio, ratio))
-        disagreement = _disagreement(mean, std, correlation)
+        disagreement = _disagreement(mean, std, self.correlation)
         if self.alone is None:
-            fused = best_linear(mean, std, correlation)
+            fused = best_linear(mean, std, self.correlation)
             centre, spread = self.centre + self.gain * (fused.mean - self.centre), fused.std
         else:
             centre, spread = mean[self.alone], std[self.alone]
@@ -117,9 +113,9 @@ def _common_rows(files: tuple[HeldOutErrors, ...]) -> tuple[Floats, Floats, Floa
 
 
 def are_comparable(files: Sequence[HeldOutErrors | None]) -> bool:
-    """Whether the correlation of the files' errors is known: one file, or enough common rows."""
-    known = tuple(dict.fromkeys(file for file in files if file is not None))
-    return None not in files and (len(known) == 1 or joint_errors(known) is not None)
+    """Whether the correlation of the errors of these files is known: by enough common rows."""
+    known = tuple(file for file in files if file is not None)
+    return len(known) == len(files) and joint_errors(known) is not None
 
 
 def _measure(truth: Floats, mean: Floats, std: Floats) -> JointErrors:
@@ -131,15 +127,14 @@ def _measure(truth: Floats, mean: Floats, std: Floats) -> JointErrors:
     plain = JointErrors(
         _positive(moments / np.outer(size, size)), None, centre, 1.0, 1.0, none, none, none
     )
-    ratio = np.ones(len(mean))
-    away = plain.fuse(mean, std, ratio)[0] - centre
+    away = plain.fuse(mean, std)[0] - centre
     few = len(truth) < MANY_ROWS
     gain = 1.0 if few else float(away @ (truth - centre) / (away @ away))
     together = replace(plain, gain=gain)
     candidates = [together, *(replace(plain, alone=i) for i in range(len(mean)))]
-    error = [np.mean((c.fuse(mean, std, ratio)[0] - truth) ** 2) for c in candidates]
+    error = [np.mean((c.fuse(mean, std)[0] - truth) ** 2) for c in candidates]
     best = candidates[int(np.argmin(error))]
-    fused, spread, _ = best.fuse(mean, std, ratio)
+    fused, spread, _ = best.fuse(mean, std)
     scale = float(np.sqrt(np.mean(((truth - fused) / spread) ** 2)))
     residual = (truth - fused) / (scale * spread)
     bins = max(min(BINS, len(truth) // LEAST_ROWS_OF_BIN), 1) if few else BINS
@@ -186,39 +181,3 @@ def _positive(correlation: Floats) -> Floats:
     repaired = (vectors * np.maximum(values, LEAST_EIGENVALUE)) @ vectors.T
     size = np.sqrt(np.diag(repaired))
     return np.asarray(repaired / np.outer(size, size))
-
-
-def fuse_rows(mean: Floats, std: Floats, files: Sequence[HeldOutErrors]) -> list[Floats]:
-    """Fuse m readings by variance and the correlation of their errors.
-
-    Returns mean, standard deviation, ends of the 90 % interval, and disagreement, each (n, q). The
-    disagreement is the largest difference between two files, in standard deviations of that
-    difference; 0 for readings of one file.
-
-    Readings of the same file are averaged first: what they have in common of their error, which
-    the file carries, does not average out. The averages of different files are then fused by
-    `JointErrors`.
-
-    mean, std (m, n, q): Estimates of the m readings.
-    files: Of the file that each reading was estimated by, (m,);
-        `are_comparable` must hold.
-
-    Raises `ValueError` where the files have too few held-out rows in common.
-    """
-    distinct = tuple(dict.fromkeys(files))
-    members = [[i for i, other in enumerate(files) if other == file] for file in distinct]
-    repeated = [file.repeated(len(m)) for file, m in zip(distinct, members, strict=True)]
-    ratio = np.stack([r for r, _ in repeated])  # (files, q)
-    means = np.stack([mean[m].mean(axis=0) for m in members])
-    stds = np.stack([std[m].mean(axis=0) for m in members]) * ratio[:, None, :]
-    if len(distinct) == 1:
-        half = repeated[0][1] * stds[0]
-        return [means[0], stds[0], means[0] - half, means[0] + half, 0.0 * half]
-    rules = joint_errors(distinct)
-    if rules is None:
-        raise ValueError("the files have too few held-out rows in common")
-    columns = []
-    for k, rule in enumerate(rules):
-        fused, spread, disagreement = rule.fuse(means[..., k], stds[..., k], ratio[:, k])
-        columns.append((fused, spread, *rule.interval(fused, spread), disagreement))
-    return [np.stack(column, axis=-1) for column in zip(*columns, strict=True)]

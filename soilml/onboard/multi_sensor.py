@@ -11,18 +11,10 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
-from soilml.onboard.fusion_rules import inverse_variance
-from soilml.onboard.gaussian_product import gaussian_product
-from soilml.onboard.joint_errors import are_comparable, fuse_rows
+from soilml.onboard.held_out_errors import HeldOutErrors
+from soilml.onboard.joint_errors import are_comparable, joint_errors
 from soilml.onboard.set_contract import Floats
-from soilml.quantities import Z_90
 
-#: Fusion by variance and by the correlation of the errors, which the files carry.
-CORRELATED = "correlated"
-#: Fusion of estimates with independent errors and a common prior, which is counted once.
-PRIOR_ONCE = "prior-once"
-#: Rules by which estimates of different files can be fused; the last is that of a source paper.
-ACROSS_FILES = (CORRELATED, PRIOR_ONCE, "inverse-variance")
 #: Estimates further apart than this are contradictory, in standard deviations of the difference.
 CONTRADICTION = 4.0
 #: Priors that differ by less than this share of their standard deviation count as the same.
@@ -41,71 +33,44 @@ class MultiSensorEstimate:
         Of leading shape (...).
     used : ndarray of bool, shape (m, ...)
         Which of the m estimates each row used.
-    rule : str
-        The rule that was applied.
     disagreement : ndarray, shape (...)
-        By the rule `correlated`, the largest difference of two files in standard deviations of that
-        difference: its mean square over many readings is about 1 where the files are right for
-        this soil, and well above where one is not. 0 for a single file and by other rules.
+        The largest difference of two files in standard deviations of that difference: its mean
+        square over many readings is about 1 where the files are right for this soil, and well above
+        where one is not. 0 for a single file.
     """
 
     estimate: Estimate
     used: NDArray[np.bool_]
-    rule: str
     disagreement: Floats
 
 
-def fuse_estimates(estimates: Sequence[Estimate], rule: str | None = None) -> MultiSensorEstimate:
-    r"""Fuse estimates of the same quantities and prior, of several sensors or of one repeatedly.
+def fuse_estimates(estimates: Sequence[Estimate]) -> MultiSensorEstimate:
+    """Fuse estimates of the same quantities and prior, of a file for each of several sensors.
 
-    Repeated readings must be of one soil, slip and load; each is an estimate of the same file.
+    They are weighed by variance under the correlation of their errors, which files trained from the
+    same data carry (`soilml.onboard.joint_errors`). Where one file alone was better on the held-out
+    rows, the fused estimate is that file's. Its intervals are calibrated on held-out rows.
 
     Estimates out of range are not used. A single remaining one is returned unchanged. Where none
     remains, or where two differ by more than `CONTRADICTION` standard deviations of their
-    difference, the result is the prior and `in_range` is false. By the rule `correlated`, the
-    correlation of their errors is part of that difference's deviation.
+    difference, with the correlation and without, the result is the prior and `in_range` is false.
 
     Parameters
     ----------
     estimates : sequence of Estimate
         All of one shape (...), with the same names and prior.
-    rule : str, optional
-        One of `ACROSS_FILES`; `correlated` by default, or `prior-once` where the correlation is not
-        known. `correlated` weighs by variance under the correlation of the errors, which files
-        trained from the same data carry (`soilml.onboard.joint_errors`): repeated
-        readings of a file share the error that its soil causes. Where one file alone was better on
-        the held-out rows, the fused estimate is that file's. `prior-once`,
-
-        .. math:: P^{-1} = P_0^{-1} + \sum_i (P_i^{-1} - P_0^{-1}),
-
-        is exact for Gaussian estimates whose errors are independent. `inverse-variance` (Comin and
-        Saaj 2017, eq. 26) counts the prior in every estimate: it is overconfident unless the
-        readings are far more informative than the prior.
 
     Returns
     -------
     MultiSensorEstimate
-        Its intervals are calibrated on held-out rows by the rule `correlated`, and Gaussian by the
-        others, which take repeated readings for independent.
 
     Raises
     ------
     InputError
-        For an unknown rule, for estimates of different quantities, shapes, priors or loads, and
-        for the rule `correlated` where the correlation is not known.
+        For estimates of different quantities, shapes, priors or loads, and of files that do not
+        state their errors on common rows.
     """
-    if rule is not None and rule not in ACROSS_FILES:
-        raise InputError(
-            f"rule is {rule!r}; for estimates of several files: {', '.join(ACROSS_FILES)}"
-        )
     _check_compatible(estimates)
-    known = are_comparable([e.errors for e in estimates])
-    if rule == CORRELATED and not known:
-        raise InputError(
-            "rule is 'correlated', but the files do not state their errors on common rows: train "
-            "them from one data file, or give another rule"
-        )
-    rule = rule or (CORRELATED if known else PRIOR_ONCE)
     first, q, shape = estimates[0], len(estimates[0].names), estimates[0].in_range.shape
     mean, low, high = (
         np.stack([getattr(e, key).reshape(-1, q) for e in estimates])
@@ -123,13 +88,9 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str | None = None) -> Mu
             parts = (mean[members[0]], covariance[members[0]], low[members[0]], high[members[0]])
             found: Sequence[Any] = [part[rows] for part in parts]
         elif members.size > 1:
-            of_members = mean[members][:, rows], covariance[members][:, rows]
-            if rule == CORRELATED:
-                files = [estimates[int(i)].errors for i in members]
-                *found, apart = _fuse_by_correlation(*of_members, files)
-                disagreement[rows], contradictory[rows] = apart, apart > CONTRADICTION
-            else:
-                found = _fuse_by_variance(*of_members, first.prior, rule)
+            files = [errors for i in members if (errors := estimates[int(i)].errors)]
+            *found, apart = _fuse(mean[members][:, rows], covariance[members][:, rows], files)
+            disagreement[rows], contradictory[rows] = apart, apart > CONTRADICTION
         else:
             continue
         for key, values in zip(("mean", "covariance", "low", "high"), found, strict=True):
@@ -157,39 +118,30 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str | None = None) -> Mu
         load=first.load,
     )
     return MultiSensorEstimate(
-        estimate, used.reshape(len(used), *shape), rule, np.asarray(disagreement.reshape(shape))
+        estimate, used.reshape(len(used), *shape), np.asarray(disagreement.reshape(shape))
     )
 
 
-def _fuse_by_correlation(
-    mean: Floats, covariance: Floats, files: Sequence[Any]
+def _fuse(
+    mean: Floats, covariance: Floats, files: Sequence[HeldOutErrors]
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Mean, covariance, ends of the interval, and disagreement (n,), of estimates (m, n, ...)."""
+    """Mean, covariance, ends of the interval, and disagreement (n,), of estimates (m, n, ...).
+
+    The correlation between quantities is the mean over the estimates.
+    """
+    rules = joint_errors(tuple(files))
+    assert rules is not None  # they are comparable
     stds = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3))
-    centre, std, low, high, disagreement = fuse_rows(mean, stds, files)
-    fused = _mean_correlation(covariance) * std[:, :, None] * std[:, None, :]
-    return centre, fused, low, high, disagreement.max(axis=-1)
-
-
-def _fuse_by_variance(
-    mean: Floats, covariance: Floats, prior: PriorSummary, rule: str
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Mean (n, q), covariance (n, q, q) and ends of the interval, of estimates (m, n, ...)."""
-    if rule == PRIOR_ONCE:
-        by_row = np.moveaxis(mean, 0, 1), np.moveaxis(covariance, 0, 1)
-        centre, fused = gaussian_product(*by_row, prior)
-    else:
-        found = inverse_variance(mean, np.sqrt(np.diagonal(covariance, axis1=2, axis2=3)))
-        centre, std = found.mean, found.std
-        fused = _mean_correlation(covariance) * std[:, :, None] * std[:, None, :]
-    half = Z_90 * np.sqrt(np.diagonal(fused, axis1=1, axis2=2))
-    return centre, fused, centre - half, centre + half
-
-
-def _mean_correlation(covariance: Floats) -> Floats:
-    """Correlation (n, q, q) between quantities, the mean over estimates (m, n, q, q)."""
-    std = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3))
-    return np.asarray(np.mean(covariance / (std[..., None] * std[..., None, :]), axis=0))
+    columns = []
+    for k, rule in enumerate(rules):
+        fused, spread, disagreement = rule.fuse(mean[..., k], stds[..., k])
+        columns.append((fused, spread, *rule.interval(fused, spread), disagreement))
+    centre, std, low, high, apart = (
+        np.stack(column, axis=-1) for column in zip(*columns, strict=True)
+    )
+    correlation = np.mean(covariance / (stds[..., None] * stds[..., None, :]), axis=0)
+    joint = correlation * std[:, :, None] * std[:, None, :]
+    return centre, np.asarray(joint), low, high, apart.max(axis=-1)
 
 
 def _contradictory(mean: Floats, covariance: Floats, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -236,6 +188,14 @@ def _check_compatible(estimates: Sequence[Estimate]) -> None:
                     f"{_format_range(first.prior)} and {_format_range(other.prior)}; train both "
                     "from one recipe"
                 )
+    files = [given.errors for given in estimates]
+    known = [errors for errors in files if errors is not None]
+    if len({*known}) < len(known):
+        raise InputError("two estimates are of one file: give one of each file")
+    if not are_comparable(files):
+        raise InputError(
+            "the files do not state their errors on common rows: train them from one data file"
+        )
 
 
 def _format_range(prior: PriorSummary) -> str:

@@ -14,7 +14,7 @@ from soilml.errors import InputError
 from soilml.io.table import ALL, Table
 from soilml.onboard.estimate import Reason
 from soilml.onboard.estimator import Estimator
-from soilml.onboard.set_contract import INFERRED, MODEL_ERROR_INPUT, OPERATING_NOISE
+from soilml.onboard.set_contract import INFERRED, MODEL_ERROR_INPUT
 from soilml.onboard.table_estimates import (
     ERRORS_SHOWN,
     TableEstimates,
@@ -22,8 +22,8 @@ from soilml.onboard.table_estimates import (
     joint_readings,
     sensor_errors_shown,
 )
-from soilml.quantities import CHANNELS, NOT_IDENTIFIED_ABOVE, column
-from soilml.remarks import NEXT_ROW, Remark
+from soilml.quantities import CHANNELS, NOT_IDENTIFIED_ABOVE
+from soilml.remarks import Remark
 from soilml.report.numbers import shown_unit, significant
 from soilml.report.report import Report
 from soilml.report.tables import ReportTable
@@ -98,26 +98,12 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def typical(found: TableEstimates) -> int | None:
-    """The row in range of median width, or the widest group; None where none is in range."""
-    inside = found.answered & found.estimate.in_range
-    width = np.mean((found.estimate.std / found.estimate.prior_std) ** 2, axis=1)
-    order = np.argsort(np.where(inside, width, np.inf))[: int(inside.sum())]
-    if not order.size:
-        return None
-    return int(order[-1] if found.by is not None else order[(order.size - 1) // 2])
-
-
 def remarks_on(found: TableEstimates, estimators: Sequence[Estimator]) -> list[Remark]:
     """What to know of estimates: what they use and do not determine, and rows without one."""
     first, table, by = estimators[0], found.table, found.by
     remarks = [] if by is None else _channel_remarks(first, table)
     remarks += _width_remarks(found)
-    if found.rule is not None:
-        remarks.append(Remark("fused", f"fused by the rule {found.rule}", severity="note"))
     remarks += _row_refusals(found) if by is None else _group_refusals(found)
-    if by is None or first.sets is None:
-        remarks += _unused_std_remarks(first, table)
     some = np.any([complete_rows(estimator, table) for estimator in estimators], axis=0)
     unanswered = some & ~table.answered
     remarks += _excluded_rows(table, ~some, "missing-reading", "lack a reading")
@@ -223,17 +209,6 @@ def _group_refusals(found: TableEstimates) -> list[Remark]:
     return remarks
 
 
-def _unused_std_remarks(estimator: Estimator, table: Table) -> list[Remark]:
-    """A note on columns of standard deviations that estimates of single rows do not use."""
-    spreads = [f"{column(name)}_std" for name in (*CHANNELS, *OPERATING_NOISE)]
-    given = tuple(key for key in spreads if key in table)
-    if not given or (estimator.sets is not None and estimator.sets.sets_only):
-        return []
-    hint = "give --by" if estimator.sets is not None else "train a file with [set_posterior]"
-    text = f"estimates of single rows do not use {', '.join(given)}; {hint} to have them used"
-    return [Remark("unused-std", text, given, "note")]
-
-
 def _excluded_rows(table: Table, rows: NDArray[np.bool_], code: str, why: str) -> list[Remark]:
     """A remark on rows that get no estimate: how many, the reason, and the first three."""
     if not rows.any():
@@ -264,8 +239,7 @@ def estimate_report(
         verdict=verdict(columns, found.by, remarks),
         figures=None,
         tables=[ReportTable.of("Estimates", columns)],
-        remarks=[remark for remark in remarks if remark.code != NEXT_ROW],
-        next_steps=[remark.text for remark in remarks if remark.code == NEXT_ROW],
+        remarks=remarks,
         status="in range" if not outside else "mixed" if inside.any() else "out of range",
         tone="warn" if outside else "good",
         title=title,

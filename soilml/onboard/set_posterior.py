@@ -7,7 +7,7 @@ is kept in a memory of bounded size, so that a rover can continue where it stopp
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, final
 
@@ -74,7 +74,6 @@ class SetPosterior:
         constant part, and in a file for any wheel.
     constant_noise: Constant part of the noise of torque that a user has set, N m; the graph takes
         the noise as a share of the reading.
-    misfit_limits: `most`, which 99 of 100 sound sets of an exact model stay below, by `readings`.
     """
 
     terms: int
@@ -87,7 +86,6 @@ class SetPosterior:
     least_share_in_range: float
     log_torque: bool = True
     constant_noise: float = 0.0
-    misfit_limits: Mapping[str, Any] = field(default_factory=dict)
 
     @staticmethod
     def of(metadata: Mapping[str, Any]) -> SetPosterior:
@@ -107,7 +105,6 @@ class SetPosterior:
             else 1,
             least_share_in_range=float(metadata.get("least_share_in_range", FORMER_SHARE_IN_RANGE)),
             log_torque=metadata.get("kind") == "any wheel" or not constant,
-            misfit_limits=metadata.get("misfit", {}),
         )
 
     @property

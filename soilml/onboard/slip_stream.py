@@ -120,7 +120,6 @@ class SlipStream:
     metadata: Mapping[str, str] = field(repr=False)
     wheels: tuple[str, ...]
     radius: Floats  # (k,), m
-    load_range: tuple[float, float]  # N, of the table; a load beyond counts as that of its end
     load_of_attitude: Floats  # (k, 3): loads are linear in three products of sines and cosines
 
     @staticmethod
@@ -134,11 +133,10 @@ class SlipStream:
 
         def read() -> SlipStream:
             rover, table = json.loads(metadata["rover"]), json.loads(metadata["table"])
-            low, high = (float(value) for value in table["load_N"])
             shares = np.asarray(table["load_of_attitude"], dtype=np.float64)
             wheels = tuple(str(wheel["name"]) for wheel in rover["wheels"])
             radius = np.asarray([float(wheel["radius_m"]) for wheel in rover["wheels"]])
-            own = wheels, radius, (low, high), shares.reshape(-1, 3)
+            own = wheels, radius, shares.reshape(-1, 3)
             return SlipStream(session, str(path), metadata, *own)
 
         probe = metadata.get("probe", "[]")

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field, replace
-from itertools import combinations
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.errors import InputError, TableError
+from soilml.errors import TableError
 from soilml.io.read_table import Rows, as_table
 from soilml.io.table import ALL, Table
 from soilml.onboard.estimate import Estimate
@@ -89,8 +88,7 @@ class TableEstimates:
     estimate: (n,).
     answered: Whether each had a row with all readings, (n,).
     rows: Rows with all readings of each group, (n,).
-    readings: Inputs of the file by group, of those answered; of all rows where there are no groups.
-    files: Files that took part in each estimate, (n,), and the rule by which they were fused.
+    files: Files that took part in each estimate, (n,), where several are fused.
     """
 
     estimator: Estimator
@@ -100,10 +98,7 @@ class TableEstimates:
     estimate: Estimate
     answered: NDArray[np.bool_]
     rows: NDArray[np.int64]
-    readings: list[dict[str, Any]]
-    box: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # narrower prior
     files: NDArray[np.int64] | None = None
-    rule: str | None = None
 
     def columns(self, inputs: Sequence[str]) -> dict[str, Any]:
         """Columns (n,) of a table, with the readings of these names where each row is by itself."""
@@ -147,19 +142,19 @@ def estimates_of_table(
         wanted = ", ".join(column(name) for name in first.inputs)
         raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
     if by is None:
-        found, given = [], []
+        found = []
         for estimator, rows in zip(estimators, usable, strict=True):
             alone = estimator.sets is not None and estimator.sets.sets_only
             own = joint_readings if alone else row_readings
-            given.append(adjusted(estimator, own(estimator, table.rows(rows))))
+            given = adjusted(estimator, own(estimator, table.rows(rows)))
             with progress(f"estimating {int(rows.sum())} rows", int(rows.sum())) as done:
-                found.append(_estimates_of_rows(estimator, given[-1], rows, done))
+                found.append(_estimates_of_rows(estimator, given, rows, done))
         answered = np.any(usable, axis=0)
-        one = TableEstimates(first, table, None, [], found[0], answered, answered * 1, given[:1])
+        one = TableEstimates(first, table, None, [], found[0], answered, answered * 1)
         if len(found) == 1:
             return one
         fused = fuse_estimates(found)
-        return replace(one, estimate=fused.estimate, files=fused.used.sum(axis=0), rule=fused.rule)
+        return replace(one, estimate=fused.estimate, files=fused.used.sum(axis=0))
     groups = dict(table.rows(usable[0]).groups(by))
     readings = [adjusted(first, joint_readings(first, rows)) for rows in groups.values()]
     with progress(f"estimating by {by}", len(groups)) as done:
@@ -169,7 +164,7 @@ def estimates_of_table(
     answered = np.asarray([name in place for name in names])
     counts = np.asarray([len(groups[name]) if name in groups else 0 for name in names])
     estimate = estimate.at(np.asarray([place.get(name, 0) for name in names]))
-    return TableEstimates(first, table, by, names, estimate, answered, counts, readings, box or {})
+    return TableEstimates(first, table, by, names, estimate, answered, counts)
 
 
 def _estimates_of_rows(
@@ -240,18 +235,6 @@ def estimate(rows: Rows, model: Estimator | str | os.PathLike[str], by: str | No
         names = [name for name, known in zip(found.names, found.answered, strict=True) if known]
         return of_groups.to_frame().set_axis(names).rename_axis(by)
     return of_groups.at(0) if by == ALL else of_groups
-
-
-def check_independent(estimators: Sequence[Estimator]) -> None:
-    """Raise `InputError` where all inputs of one file are inputs of another: dependent errors."""
-    for first, second in combinations(estimators, 2):
-        shared = set(first.inputs) & set(second.inputs)
-        if len(shared) == min(len(first.inputs), len(second.inputs)):
-            names = ", ".join(column(name) for name in first.inputs if name in shared)
-            raise InputError(
-                f"{first.path} and {second.path} both read {names}: their errors are not "
-                "independent; use one of them"
-            )
 
 
 #: Errors of sensors that all rows share: factor from the SI unit, and text; gains in %.

@@ -31,7 +31,9 @@ from soilml.systems.wheel_legs.stride_relations import (
     SINKAGE_ERRORS,
     STIFFNESS,
     TORQUE_ERRORS,
+    TORQUE_SLIP,
     VIBRATION_ERRORS,
+    VIBRATION_SLIP,
 )
 from soilml.systems.wheel_legs.strides import HEAVY_AT, HEAVY_WHEEL
 
@@ -51,9 +53,6 @@ STD = {
     name: tuple(one.scatter[k] for one in (TORQUE_ERRORS, VIBRATION_ERRORS, SINKAGE_ERRORS))
     for k, name in enumerate(("friction", "stiffness"))
 }
-#: Variances of the slip by relations of torque and of vibration, table VI.
-TORQUE_SLIP = {"terramechanics": 0.074, "empirical": 0.005, "simplified": 0.018}
-VIBRATION_SLIP = {"planar": 0.015, "linear": 0.020}
 K_A = {"ssc-1": 0.024, "ssc-2": 0.017, "ssc-3": 0.021, "es-3": 0.022}  # Table I
 SIGMA = np.asarray([ground.normal_stiffness for ground in GROUNDS.values()])  # Pa
 
@@ -116,7 +115,7 @@ def vibration_fit(planar: bool) -> Fit:
 
 def fused_slip(torque: str, vibration: str) -> FusedEstimate:
     """Fused slip from torque and vibration, with the standard deviations of table VI (in %)."""
-    std = 100.0 * np.asarray([TORQUE_SLIP[torque], VIBRATION_SLIP[vibration]]) ** 0.5
+    std = 100.0 * np.asarray([TORQUE_SLIP[torque].slip_std, VIBRATION_SLIP[vibration].slip_std])
     return inverse_variance(np.zeros(2), std)
 
 
@@ -133,31 +132,14 @@ def efficiency(name: str) -> float:
 
 def constant_intercept() -> float:
     """Mean intercept of the empirical model (table IV) over the four soils of table I."""
-    slope = (1.0 - np.asarray(four_soils().friction_angle)) / 0.58
-    return float(np.mean((SIGMA / PRESSURE + 0.7 - 20.928 * slope) / 15.997))
+    a, _ = TORQUE_SLIP["empirical"].line(np.asarray(four_soils().friction_angle), SIGMA)
+    return float(a.mean())
 
 
 def _coefficient(fit: Callable[[], Fit], part: str, index: int | None = None) -> float:
     """A coefficient of a fit, or R^2."""
     coefficients, r2 = fit()[part]
     return r2 if index is None else float(coefficients[index])
-
-
-def _weight(torque: str, vibration: str) -> float:
-    return float(fused_slip(torque, vibration).weights[0])
-
-
-def _slip_gain(torque: str, vibration: str, index: int) -> float:
-    single = float((TORQUE_SLIP[torque], VIBRATION_SLIP[vibration])[index] ** 0.5)
-    return float(fused_slip(torque, vibration).std) - 100.0 * single
-
-
-def _soil_weight(name: str, index: int) -> float:
-    return float(fused_soil(name).weights[index])
-
-
-def _soil_gain(name: str, index: int) -> float:
-    return float(fused_soil(name).std) - STD[name][index]
 
 
 PRINTED = printed("comin2017_slip")
@@ -223,20 +205,35 @@ COMPUTED: dict[str, Callable[[], float]] = {
         for name, k in (("a_mu", 0), ("b_mu", 1), ("gof_b", None))
     },
 }
-for _t, _torque_name in zip("tes", TORQUE_SLIP, strict=True):
-    for _v, _vibration_name in zip("pl", VIBRATION_SLIP, strict=True):
-        _key = f"t6_{_t}{_v}"
-        COMPUTED[f"{_key}_weight"] = partial(_weight, _torque_name, _vibration_name)
-        COMPUTED[f"{_key}_std_t"] = partial(_slip_gain, _torque_name, _vibration_name, 0)
-        COMPUTED[f"{_key}_std_v"] = partial(_slip_gain, _torque_name, _vibration_name, 1)
-for _name in STD:
-    for _index, _sense in enumerate("tvs"):
-        COMPUTED[f"t9_{_sense}_{_name}_weight"] = partial(_soil_weight, _name, _index)
-        COMPUTED[f"t9_{_sense}_{_name}_std"] = partial(_soil_gain, _name, _index)
-        if (_sense, _name) != ("t", "friction"):  # smaller than what rounding leaves open
-            COMPUTED[f"t9_{_sense}_{_name}_mean"] = partial(
-                _error_gain, _index, "phi" if _name == "friction" else "sigma", _name
-            )
+
+
+def _of_slips(torque: str, vibration: str) -> dict[str, Callable[[], float]]:
+    """Weight of torque, and the change of each standard deviation (%) by fusion of slips."""
+    alone = [100.0 * r.slip_std for r in (TORQUE_SLIP[torque], VIBRATION_SLIP[vibration])]
+    key = f"t6_{torque[0]}{vibration[0]}"
+    return {
+        f"{key}_weight": lambda: float(fused_slip(torque, vibration).weights[0]),
+        f"{key}_std_t": lambda: float(fused_slip(torque, vibration).std) - alone[0],
+        f"{key}_std_v": lambda: float(fused_slip(torque, vibration).std) - alone[1],
+    }
+
+
+def _of_soils(name: str, index: int, part: str) -> dict[str, Callable[[], float]]:
+    """Weight of a sensor, and the change of standard deviation and mean error (%) by fusion."""
+    key = f"t9_{'tvs'[index]}_{name}"
+    return {
+        f"{key}_weight": lambda: float(fused_soil(name).weights[index]),
+        f"{key}_std": lambda: float(fused_soil(name).std) - STD[name][index],
+        f"{key}_mean": lambda: _error_gain(index, part, name),
+    }
+
+
+for _torque_name in TORQUE_SLIP:
+    for _vibration_name in VIBRATION_SLIP:
+        COMPUTED |= _of_slips(_torque_name, _vibration_name)
+for _index in range(3):
+    COMPUTED |= _of_soils("friction", _index, "phi") | _of_soils("stiffness", _index, "sigma")
+del COMPUTED["t9_t_friction_mean"]  # smaller than what rounding leaves open
 for _soil in ("ssc-1", "ssc-2", "ssc-3", "es-3"):
     COMPUTED[f"t10_true_{_soil}"] = partial(efficiency, _soil)
     COMPUTED[f"t10_mean_{_soil}"] = partial(characterised_efficiency, _soil)

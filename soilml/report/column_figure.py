@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.report.figure_style import AFTER, BEFORE, PRIOR, UNCHANGED, short_label, take_axes
+from soilml.report.figure_style import AFTER, BEFORE, PRIOR, UNCHANGED, short_label
 from soilml.report.numbers import (
     parameter_name,
     pretty,
@@ -192,36 +192,21 @@ class ParameterIntervals:
     prior_low: Floats
     prior_high: Floats
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns of axes."""
-        return len(self.names), 1
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """Width and height of a figure, inches."""
-        lines = min(max(len(self.labels), 1), MOST_LINES)
-        height = 0.95 + 0.28 * (lines - 1) if len(self.labels) <= MOST_LINES else 1.9
-        return 7.2, height * len(self.names) + 0.25
-
-    def plot(self, ax: Any = None) -> NDArray[Any]:
-        """Draw a panel for each parameter; returns axes (p,), `ax` takes as many."""
-        axes = take_axes(ax, len(self.names), 1, self.size)[:, 0]
-        for k, panel in enumerate(axes):
-            self._draw(panel, k)
-        return np.asarray(axes)
-
     def picture(self) -> Picture:
-        """The figure with its caption."""
+        """A panel for each parameter, with its caption."""
+        lines = len(self.labels)
+        height = 0.95 + 0.28 * (lines - 1) if lines <= MOST_LINES else 1.9
+        size = 7.2, height * len(self.names) + 0.25
         caption = "Grey: the range of the prior." if np.isfinite(self.prior_low).any() else ""
         text = f"Estimates and 90 % intervals of {', '.join(map(parameter_name, self.names))}"
-        return Picture(
-            "Estimates and 90 % intervals", self.plot, *self.shape, self.size, text, caption
-        )
+        title = "Estimates and 90 % intervals"
+        return Picture(title, self._draw, len(self.names), 1, size, text, caption)
 
-    def _draw(self, panel: Axes, k: int) -> None:
-        from matplotlib.ticker import MaxNLocator
+    def _draw(self, axes: Any) -> None:
+        for k, panel in enumerate(np.ravel(axes)):
+            self._draw_parameter(panel, k)
 
+    def _draw_parameter(self, panel: Axes, k: int) -> None:
         scale = [v for v in (*self.values[:, k], self.prior_high[k]) if np.isfinite(v)]
         factor, unit = shown_unit(self.units[k], max(map(abs, scale), default=1.0))
         value, low, high = (factor * v[:, k] for v in (self.values, self.low, self.high))
@@ -230,19 +215,16 @@ class ParameterIntervals:
         place = np.arange(1, len(self.labels) + 1)
         known = np.isfinite(value)
         errors = np.maximum(np.stack([value - low, high - value]), 0.0)[:, known]
-        style: dict[str, Any] = {"color": AFTER, "elinewidth": 1.2 if many else 3, "lw": 0}
+        panel.errorbar(
+            value[known], place[known], xerr=errors, color=AFTER, lw=0, fmt="." if many else "o",
+            ms=4 if many else 6, elinewidth=1.2 if many else 3,
+        )  # fmt: skip
+        if np.isfinite(prior).all():
+            panel.axvspan(*prior, color=PRIOR, lw=0, zorder=0)
+        panel.set_ylim(len(self.labels) + 0.6, 0.4)
         if many:
-            panel.errorbar(place[known], value[known], errors, fmt=".", ms=4, **style)
-            if np.isfinite(prior).all():
-                panel.axhspan(*prior, color=PRIOR, lw=0, zorder=0)
-            panel.set_ylabel(pretty(unit))
-            panel.xaxis.set_major_locator(MaxNLocator(integer=True))
-            panel.set_xlabel("number of the result" if k == len(self.names) - 1 else "")
+            panel.set_ylabel("number")
         else:
-            panel.errorbar(value[known], place[known], xerr=errors, fmt="o", ms=6, **style)
-            if np.isfinite(prior).all():
-                panel.axvspan(*prior, color=PRIOR, lw=0, zorder=0)
-            panel.set_ylim(len(self.labels) + 0.6, 0.4)
             shown = [short_label(label) for label in self.labels] if len(place) > 1 else []
             panel.set_yticks(place if shown else [], shown)
             if max(map(len, shown), default=0) > _LONG:
@@ -255,25 +237,21 @@ _BINS = 24
 
 
 def corner_picture(names: Sequence[str], units: Sequence[str], draws: Floats) -> Picture:
-    """A corner plot of equally likely draws (n, p) in SI units; see `plot_corner`."""
+    """A corner plot of equally likely draws (n, p) in SI units: densities, and pairs below them."""
     p = len(names)
     correlation = np.corrcoef(draws.T).reshape(p, p) if p > 1 else np.ones((1, 1))
     pairs = [
         f"{names[i]} and {names[j]} {correlation[i, j]:+.2f}" for i in range(p) for j in range(i)
     ]
     text = f"correlations: {'; '.join(pairs)}" if pairs else f"density of {names[0]}"
-
-    def draw(ax: Any) -> None:
-        plot_corner(names, units, draws, ax)
-
+    draw = partial(_draw_corner, names, units, draws)
     caption = "Diagonal: densities. Below it: draws of each pair, with contours of 50 and 90 %."
     return Picture("The soil", draw, p, p, (2.5 * p, 2.3 * p), text, caption, whole=True)
 
 
-def plot_corner(names: Sequence[str], units: Sequence[str], draws: Floats, ax: Any = None) -> Any:
-    """Draw densities on the diagonal and pairs below it; axes (p, p), see `take_axes`."""
+def _draw_corner(names: Sequence[str], units: Sequence[str], draws: Floats, axes: Any) -> None:
+    """Draw into axes (p, p)."""
     p = len(names)
-    axes = take_axes(ax, p, p, (2.5 * p, 2.3 * p))
     largest = np.abs(draws).max(axis=0)
     shown = [shown_unit(unit, size) for unit, size in zip(units, largest, strict=True)]
     values = draws * np.asarray([factor for factor, _ in shown])
@@ -297,7 +275,6 @@ def plot_corner(names: Sequence[str], units: Sequence[str], draws: Floats, ax: A
                     panel.set_ylabel(labels[i])
             if i == p - 1:
                 panel.set_xlabel(labels[j])
-    return axes
 
 
 def _pair(panel: Any, x: Floats, y: Floats) -> None:

@@ -1,7 +1,7 @@
 """A result as data: verdict, key figures, tables, pictures and remarks; all forms are made of it.
 
 A room that computes makes one `Report`. Numbers stay numbers in SI units: how they are rounded and
-in which units they are shown is decided here, once for terminal, page, notebook and Markdown.
+in which units they are shown is decided here, once for terminal, page and notebook.
 """
 
 from __future__ import annotations
@@ -126,16 +126,6 @@ class Report:
                 parts.append("\n".join(own))
         return "\n\n".join(parts)
 
-    def markdown(self) -> str:
-        """Verdict, lines and tables as Markdown."""
-        parts = [f"**{self.verdict}**", *map(pretty, self.lines)]
-        for table in self.all_tables:
-            heads, rows, _ = table.cells()
-            lines = [heads, ["---"] * len(heads), *rows]
-            parts.append("\n".join(f"| {' | '.join(map(_piped, cells))} |" for cells in lines))
-        parts += [f"- {pretty(remark.text)}" for remark in self.remarks]
-        return "\n\n".join(parts)
-
     @property
     def answer(self) -> list[str]:
         """Verdict, lines and key figures as sentences, for programs."""
@@ -194,7 +184,3 @@ def by_group(
         tone=next((tone for tone in ("bad", "warn", "plain", "good") if tone in tones), "plain"),
         title=title,
     )
-
-
-def _piped(cell: str) -> str:
-    return pretty(cell).replace("|", "\\|")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,17 +14,13 @@ from soilml.physics.effects.grousers import Grousers
 from soilml.physics.gears import Wheel
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
-from soilml.processes import process_map, usable_cores
 from soilml.rover_design.study import DesignStudy
 from soilml.rover_design.worlds import DrawnWorlds
-from soilml.traction.rover_performance import NeededSlip
+from soilml.traction.vehicle import NeededSlip
 
 #: Slips of a sweep and of a reported design, as shares of the slip limit.
 SWEPT = np.asarray([0.12, 0.3, 0.55, 0.8, 1.0])
 REPORTED = np.asarray([0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0])
-#: Rows of wheel, slip and world that a process solves at a time, which bounds its memory. Worlds
-#: differ by their effects, and rows with one effect are solved together: few cost as much as many.
-BLOCK_ROWS = 300_000
 #: Of a rover, each slip and lug is reckoned by the rim, as `Grousers.rim_slip` says.
 RIM_SLIP = 1.0
 
@@ -67,7 +62,7 @@ def evaluate(
         DP_i = DP(s, W_i) + W_i (e_1 + e_2 s) + \delta(s, W_i)
 
     The first, at the least slip s that all wheels share, gives the slip that the slope needs, as in
-    `soilml.traction.rover_performance`. The errors of the model e and delta are those of the world.
+    `soilml.traction.vehicle`. The errors of the model e and delta are those of the world.
 
     designs: Values (k,) by dimension of the study.
     shares: Slips, as shares of the slip limit.
@@ -90,39 +85,6 @@ def evaluate(
         for own, part in parts:
             joined[field.name][own] = getattr(part, field.name)
     return Outcomes(**joined)
-
-
-def in_blocks(
-    study: DesignStudy,
-    designs: Mapping[str, Floats],
-    worlds: DrawnWorlds,
-    keep: Callable[[NDArray[np.int64], Outcomes], None],
-    progress: Callable[[int], None] | None = None,
-) -> None:
-    """Evaluate designs on the slips of a sweep, in blocks and by several processes.
-
-    keep: Given the numbers of some designs (b,) and their outcomes, which are not held.
-    progress: Given the number of designs done.
-    """
-    count = len(designs["radius"])
-    axles = max(1, int(designs["wheels"].max()) // 2)
-    most = max(1, BLOCK_ROWS // (worlds.count * len(SWEPT) * axles))
-    size = max(1, min(most, count // usable_cores()))
-    blocks = [np.arange(i, min(i + size, count)) for i in range(0, count, size)]
-    values = [{name: column[block] for name, column in designs.items()} for block in blocks]
-    solve = partial(_swept, study, worlds)
-    done = 0
-    with process_map(solve, values) as results:
-        for block, found in zip(blocks, results, strict=True):
-            keep(block, found)
-            done += len(block)
-            if progress is not None:
-                progress(done)
-
-
-def _swept(study: DesignStudy, worlds: DrawnWorlds, designs: Mapping[str, Floats]) -> Outcomes:
-    """Outcomes of designs (k,) on the slips of a sweep."""
-    return evaluate(study, designs, worlds, shares=SWEPT)
 
 
 def _of_equal_wheels(

@@ -8,10 +8,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED, take_axes
+from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED
 from soilml.report.numbers import (
     format_band,
     format_quantity,
@@ -22,7 +21,7 @@ from soilml.report.numbers import (
 )
 from soilml.report.report import Picture, Report
 from soilml.report.tables import Column, ReportTable
-from soilml.rover_design.search import QUANTILES, RESULTS, Designs
+from soilml.rover_design.search import QUANTILES, RESULTS
 from soilml.rover_design.study import DIMENSIONS
 
 if TYPE_CHECKING:
@@ -53,8 +52,8 @@ def report_of_design(found: DesignReport, title: str) -> Report:
         tables=[_designs(found), *_tables(found)],
         pictures=[
             Picture(
-                "Designs", partial(plot_designs, found), 2, 2, SIZE, _verdict(found),
-                "White line: where the goal is met. Point: the best design.",
+                "Designs", partial(_draw_designs, found), 1, 3, SIZE, _verdict(found),
+                "Points: the designs that were tried. Large point: the best one.",
             )
         ],
         remarks=found.remarks,
@@ -106,8 +105,10 @@ def _designs(found: DesignReport) -> ReportTable:
     of its band.
     """
     goal, designs = found.study.goal, found.designs
-    index = np.linspace(0, len(found.front) - 1, min(len(found.front), MOST_ROWS)).round()
-    numbers = found.front[np.unique(index).astype(int)]
+    numbers, smallest = found.front, designs.least_of(goal.least)[found.front]
+    if len(numbers) > MOST_ROWS:  # those nearest to steps of what is to be least
+        steps = np.linspace(smallest[0], smallest[-1], MOST_ROWS)[:, None]
+        numbers = numbers[np.unique(np.abs(smallest - steps).argmin(axis=1))]
 
     def values(key: str) -> Floats:
         best, others = (
@@ -116,7 +117,7 @@ def _designs(found: DesignReport) -> ReportTable:
         )
         return np.concatenate([[best[key]], np.asarray(others[key], float)[numbers]])
 
-    least = "lugs_needed" if goal.least == "lug_count" else RESULTS.get(goal.least, "probability")
+    least = RESULTS.get(goal.least, "probability")
     first = ("probability", least)
     columns = sorted(_COLUMNS, key=lambda c: first.index(c[0]) if c[0] in first else len(first))
     climbed = values("probability_climbed") >= FEWEST
@@ -169,37 +170,22 @@ def _tables(found: DesignReport) -> Iterator[ReportTable]:
         )
 
 
-SIZE = (10.0, 7.0)  # Width and height of the figure, inches
-LEVELS = 10  # Levels of the contours
+SIZE = (13.5, 4.0)  # Width and height of the figure, inches
 #: Units of results that a goal may ask to be least.
 UNITS = {"energy": "work of the wheels, J/m", "torque": "torque of a wheel, N m"}
 
 
-def plot_designs(report: DesignReport, ax: Any = None) -> NDArray[Any]:
-    """Draw four panels: probability, margin at the risk, front, shares of the variance.
-
-    The first two are contours over the first two dimensions that vary, with the others as the best
-    design has them, or curves where one varies.
-
-    ax: Four axes of matplotlib; a new figure where None. Returns the axes, (2, 2). Raises
-        `InputError` for another number of axes.
-    """
-    panels = take_axes(ax, 2, 2, SIZE)
-    goal, varied = report.study.goal, report.study.varied
-    titles = ("probability of meeting the goal", f"margin at a risk of {goal.risk:g}, N")
-    if report.contours is not None:
-        _contours(panels[0, 0], report, report.contours, "probability", titles[0])
-        _contours(panels[0, 1], report, report.contours, "margin_at_risk_N", titles[1])
-    elif varied:
-        _curve(panels[0, 0], report, "probability", titles[0])
-        _curve(panels[0, 1], report, "margin_at_risk_N", titles[1])
-    else:
-        for panel, title in zip(panels[0], titles, strict=True):
-            panel.text(0.5, 0.5, "one design", ha="center", transform=panel.transAxes)
-            panel.set_title(title)
-    _front(panels[1, 0], report)
-    _shares(panels[1, 1], report)
-    return panels
+def _draw_designs(report: DesignReport, axes: Any) -> None:
+    """Draw probability and margin at the risk of all designs, and the front, into three panels."""
+    panels = np.ravel(axes)
+    titles = (
+        "probability of meeting the goal",
+        f"margin at a risk of {report.study.goal.risk:g}, N",
+    )
+    for panel, key, title in zip(panels, ("probability", "margin_at_risk_N"), titles, strict=False):
+        _by_size(panel, report, key)
+        panel.set_title(title)
+    _front(panels[2], report)
 
 
 def axis_label(name: str) -> str:
@@ -212,39 +198,21 @@ def shown(name: str, values: Floats) -> Floats:
     return np.asarray(shown_unit(DIMENSIONS[name].unit)[0] * np.asarray(values))
 
 
-def _contours(panel: Any, report: DesignReport, grid: Designs, key: str, title: str) -> None:
-    names = report.study.varied[:2]
-    x, y = (shown(name, grid.dimensions[name]) for name in names)
-    values = np.where(np.isfinite(grid.results[key]), grid.results[key], np.nan)
-    known = np.isfinite(values)
-    enough = len(np.unique(x[known])) > 1 and len(np.unique(y[known])) > 1
-    if enough and np.ptp(values[known]) > 0.0:
-        filled = panel.tricontourf(x[known], y[known], values[known], LEVELS, cmap="cividis")
-        panel.figure.colorbar(filled, ax=panel)
-        wanted = 1.0 - report.study.goal.risk if key == "probability" else report.study.goal.margin
-        if values[known].min() < wanted < values[known].max():
-            panel.tricontour(x[known], y[known], values[known], [wanted], colors="white")
+def _by_size(panel: Any, report: DesignReport, key: str) -> None:
+    """A result of all designs: by colour over two dimensions, or over the first one."""
+    names, designs = report.study.varied[:2] or ["radius"], report.designs
+    places = [shown(name, designs.dimensions[name]) for name in names]
     best = [float(shown(name, np.asarray(report.best_dimensions[name]))) for name in names]
-    panel.plot(*best, "o", color="white", mec="black", ms=8, clip_on=False)
     panel.set_xlabel(axis_label(names[0]))
-    panel.set_ylabel(axis_label(names[1]))
-    panel.set_title(title)
-
-
-def _curve(panel: Any, report: DesignReport, key: str, title: str) -> None:
-    (name,) = report.study.varied
-    designs = report.designs
-    order = np.argsort(designs.dimensions[name])
-    x = shown(name, designs.dimensions[name])[order]
-    panel.plot(x, designs.results[key][order], "-", color=AFTER)
-    if key != "probability":
-        low, high = (designs.results[f"margin_N{end}"][order] for end in ("_p05", "_p95"))
-        panel.fill_between(x, low, high, color=AFTER, alpha=0.2, lw=0)
-        panel.axhline(0.0, color=UNCHANGED, lw=0.8)
-    best = float(shown(name, np.asarray(report.best_dimensions[name])))
-    panel.axvline(best, color=BEFORE, lw=1.0)
-    panel.set_xlabel(axis_label(name))
-    panel.set_title(title)
+    if len(names) == 2:
+        points = panel.scatter(*places, c=designs.results[key], s=18, cmap="cividis")
+        panel.figure.colorbar(points, ax=panel)
+        panel.plot(*best, "o", color="white", mec="black", ms=9, clip_on=False)
+        panel.set_ylabel(axis_label(names[1]))
+        return
+    order = np.argsort(places[0])
+    panel.plot(places[0][order], designs.results[key][order], ".-", color=AFTER)
+    panel.axvline(best[0], color=BEFORE, lw=1.0)
 
 
 def _front(panel: Any, report: DesignReport) -> None:
@@ -263,14 +231,3 @@ def _front(panel: Any, report: DesignReport) -> None:
     panel.set_ylabel(f"margin at a risk of {report.study.goal.risk:g}, N")
     panel.set_title(f"front: margin against {least.replace('_', ' ')}")
     panel.legend(frameon=False, fontsize=9)
-
-
-def _shares(panel: Any, report: DesignReport) -> None:
-    shares = report.shares[:8][::-1]
-    panel.barh(range(len(shares)), [100.0 * one.share for one in shares], 0.35, color=AFTER)
-    for number, one in enumerate(shares):
-        panel.text(0.0, number + 0.22, one.text, fontsize=9)
-    panel.set_yticks([])
-    panel.set_ylim(-0.4, len(shares) - 0.2)
-    panel.set_xlabel("share of the margin's variance, %")
-    panel.set_title("origin of the margin's spread")

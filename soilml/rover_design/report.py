@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,17 +21,12 @@ from soilml.rover_design.search import (
     QUANTILES,
     Designs,
     best_design,
-    grid_fractions,
     meets,
-    optimised,
-    optimised_count,
     pareto_front,
     quantile_of_worlds,
+    searched,
     summary,
-    swept,
-    tried,
 )
-from soilml.rover_design.search import at_fractions as dimensions_at
 from soilml.rover_design.study import DesignStudy, read_study
 from soilml.rover_design.uncertainty import (
     DRAWS,
@@ -45,7 +41,6 @@ if TYPE_CHECKING:
     from soilml.report.report import Report
 
 WORLDS = 1000  # Draws of soil and model error under which designs are compared
-SLICE = 144  # Designs of the contours through the best one
 #: Function of a stage, of the designs done and of those in all.
 Progress = Callable[[str, int, int], None]
 
@@ -73,8 +68,6 @@ class DesignReport(Result):
     best_dimensions: Its dimensions.
     met: Whether it meets the goal with the probability that the risk leaves.
     front: Numbers of the designs that no other one beats in margin and in what is to be least.
-    contours: Designs about the best one over the first two dimensions that vary; None where fewer
-        do.
     by_soil: What the best design does on each of several soils; empty for one.
     shares: First-order shares of the variance of the best design's margin.
     tests: Tests that would reduce it.
@@ -87,7 +80,6 @@ class DesignReport(Result):
     best_dimensions: dict[str, float]
     met: bool
     front: NDArray[np.int64]
-    contours: Designs | None
     by_soil: tuple[SoilOutcome, ...]
     shares: tuple[VarianceShare, ...]
     tests: tuple[PossibleTest, ...]
@@ -141,7 +133,6 @@ def design(
     *,
     designs: int = DESIGNS,
     draws: int = WORLDS,
-    optimise: bool = True,
     progress: Progress | None = None,
 ) -> DesignReport:
     """Which wheels climb a slope, with what margin and probability.
@@ -155,11 +146,9 @@ def design(
         The question: a file with [rover], [wheel], [soil] and [goal], or what `read_study` makes of
         it.
     designs
-        Number of designs of the sweep.
+        Number of designs of the first round; later rounds search about the best one.
     draws
         Number of draws of the soil and of the model's error.
-    optimise
-        Whether to search between the designs of the sweep too.
     progress
         Function of the stage, the designs done and all of them.
 
@@ -179,38 +168,23 @@ def design(
     if not isinstance(study, DesignStudy):
         study = read_study(study)
 
-    def stage(name: str, total: int) -> Callable[[int], None] | None:
-        if progress is None:
-            return None
-        return lambda done: progress(name, min(done, total), total)
-
     rows = soil_of_rows(study.soil)
     worlds = draw_worlds(study.soil, draws, study.goal.slip_limit, rows=rows)
-    found = swept(study, worlds, designs, stage("designs", designs))
-    searched = any(study.dimensions[name].searched for name in study.varied)
-    if optimise and searched and found.count > 1:
-        more = stage("optimisation", optimised_count(study))
-        found = optimised(study, worlds, found, more)
+    found = searched(study, worlds, designs, progress and partial(progress, "designs"))
     best = best_design(study, found)
     dimensions = {name: float(values[best]) for name, values in found.dimensions.items()}
     own = draw_worlds(study.soil, DRAWS, study.goal.slip_limit, seed=1, rows=rows)
     outcome = evaluate(study, {k: np.asarray([v]) for k, v in dimensions.items()}, own)
     results = {name: float(values[0]) for name, values in summary(study, outcome).items()}
     enough = results["probability"] >= 1.0 - study.goal.risk
-    contours = None
-    if len(study.varied) > 1:
-        fractions = grid_fractions(study, study.varied[:2], SLICE)
-        grid = dimensions_at(study, fractions, dimensions)
-        contours = tried(study, grid, worlds, stage("contours", SLICE))
     remarks = (*worlds.remarks, *_remarks(study, found, dimensions, results, outcome, draws))
     return DesignReport(
         study=study,
         designs=found,
         best=results,
         best_dimensions=dimensions,
-        met=bool(enough and found.lugs_suffice[best]),
+        met=enough,
         front=pareto_front(study, found),
-        contours=contours,
         by_soil=tuple(_by_soil(own, outcome)),
         shares=tuple(variance_shares(own, outcome)),
         tests=tuple(possible_tests(own, outcome)),
@@ -264,10 +238,6 @@ def _remarks(
             "adds 1 to 2 N; drive a wheel with them and without"
         )
         yield Remark("lugs-understated", text, ("lug_height",), "note")
-        needed = results["lugs_needed"]
-        if "lug_count" in best and best["lug_count"] < needed:
-            text = f"{best['lug_count']:g} lugs are too few: {needed:.0f} are needed between which "
-            yield Remark("few-lugs", f"{text}the soil moves with the wheel", ("lug_count",))
     if abs(study.gravity / GRAVITY["earth"] - 1.0) > 0.02:
         text = (
             f"gravity is {study.gravity:.3g} m/s^2: the soil is taken to have the parameters that "

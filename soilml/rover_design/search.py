@@ -1,22 +1,28 @@
-"""Designs that are tried: a sweep of the limits, an optimisation between them, and the front."""
+"""Designs that are tried: points within the limits, then points about the best one; the front."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.optional_imports import need
-from soilml.rover_design.performance import Outcomes, in_blocks
-from soilml.rover_design.study import STEP, DesignStudy
+from soilml.processes import process_map, usable_cores
+from soilml.rover_design.performance import SWEPT, Outcomes, evaluate
+from soilml.rover_design.study import DesignStudy
 from soilml.rover_design.worlds import DrawnWorlds
 
-DESIGNS = 250  # Designs of a sweep, unless another number is asked for
-#: Of the optimisation: designs of a generation for each dimension, and generations.
-POPULATION, GENERATIONS = 8, 12
+DESIGNS = 250  # Designs of the first round, unless another number is asked for
+#: Later rounds, each with a share of the designs of the first, within a share of the limits about
+#: the best design so far, which shrinks from round to round.
+ROUNDS, SHARE, REACH, SHRINK = 6, 0.15, 0.25, 0.5
+#: Rows of wheel, slip and world that a process solves at a time, which bounds its memory. Worlds
+#: differ by their effects, and rows with one effect are solved together: few cost as much as many.
+BLOCK_ROWS = 300_000
 #: Quantiles of every result over the worlds, and their endings in tables.
 QUANTILES = {"_p05": 0.05, "": 0.5, "_p95": 0.95}
 #: Results of a design that have quantiles, and the names of their columns.
@@ -49,97 +55,76 @@ class Designs:
         """Number of designs, k."""
         return len(self.results["probability"])
 
-    @property
-    def lugs_suffice(self) -> NDArray[np.bool_]:
-        """Designs (k,) with as many lugs as the model of the lugs takes for granted."""
-        if "lug_count" not in self.dimensions:
-            return np.ones(self.count, dtype=bool)
-        needed = np.nan_to_num(self.results["lugs_needed"])
-        return np.asarray(self.dimensions["lug_count"] >= needed)
-
     def least_of(self, least: str) -> Floats:
         """What the goal asks to be least, (k,)."""
         if least in self.dimensions:
             return self.dimensions[least]
-        if least == "lug_count":
-            return self.results["lugs_needed"]
         return np.nan_to_num(self.results[RESULTS[least]], nan=np.inf)
 
     def joined(self, other: Designs) -> Designs:
-        """These designs and others, each design once."""
-        both = [
-            {key: np.concatenate([column, theirs[key]]) for key, column in mine.items()}
-            for mine, theirs in (
-                (self.dimensions, other.dimensions),
-                (self.results, other.results),
-            )
-        ]
-        rows = np.stack(list(both[0].values()), axis=1).round(12)
-        first = np.sort(np.unique(rows, axis=0, return_index=True)[1])
-        return Designs(*({key: column[first] for key, column in part.items()} for part in both))
+        """These designs, then others."""
+        both = (self.dimensions, other.dimensions), (self.results, other.results)
+        return Designs(
+            *({key: np.concatenate([own[key], its[key]]) for key in own} for own, its in both)
+        )
 
 
-def swept(
+def searched(
     study: DesignStudy,
     worlds: DrawnWorlds,
     count: int = DESIGNS,
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Designs:
-    """A grid of the limits where one or two dimensions vary, Sobol points where more do.
+    """About `count` designs within the limits, then rounds of further ones about the best so far.
 
-    References: Sobol, USSR Comput. Math. Math. Phys. 7(4), 1967.
+    The best one has the least of what the goal asks for among those that meet it; where none does,
+    it is the likeliest. All are compared in the same worlds.
+
+    progress: Function of the designs done, and of those in all.
+
+    References: Sobol, USSR Comput. Math. Math. Phys. 7(4), 1967 (points within the limits).
     """
-    varied = study.varied
-    if len(varied) > 2:
-        need("scipy", "design with more than two open dimensions")
-        from scipy.stats import qmc
+    need("scipy", "design")
+    from scipy.stats import qmc
 
-        unit = qmc.Sobol(len(varied), seed=0).random_base2(int(np.ceil(np.log2(count))))[:count]
-        fractions = dict(zip(varied, unit.T, strict=True))
-    else:
-        fractions = grid_fractions(study, varied, count)
-    return tried(study, at_fractions(study, fractions), worlds, progress)
-
-
-def grid_fractions(study: DesignStudy, names: Sequence[str], count: int) -> dict[str, Floats]:
-    """Fractions (k,) of a grid over some dimensions, with their ends; about `count` points."""
-    if not names:
-        return {"radius": np.zeros(1)}
-    sizes: dict[str, int] = {}
-    for name in sorted(names, key=lambda n: study.dimensions[n].searched):
-        left = count / max(int(np.prod(list(sizes.values()))), 1)
-        own = study.dimensions[name]
-        points = max(2, int(left ** (1.0 / (len(names) - len(sizes))) + 1e-9))
-        if not own.searched:
-            points = len(own.values)
-        elif name in STEP:
-            points = min(points, 1 + round((own.values[1] - own.values[0]) / STEP[name]))
-        sizes[name] = points
-    axes = []
-    for name in names:
-        own, points = study.dimensions[name], sizes[name]
-        if own.searched and name not in STEP:
-            axes.append(np.linspace(0.0, 1.0, points))
-        else:
-            axes.append((np.arange(points) + 0.5) / points)
-    grid = np.meshgrid(*axes, indexing="ij")
-    return {name: axis.ravel() for name, axis in zip(names, grid, strict=True)}
-
-
-def at_fractions(
-    study: DesignStudy,
-    fractions: Mapping[str, Floats],
-    others: Mapping[str, float] | None = None,
-) -> dict[str, Floats]:
-    """Values (k,) of all dimensions: at fractions, as in `others`, or else the first ones."""
-    count = len(next(iter(fractions.values())))
-    found = {}
-    for name, own in study.dimensions.items():
-        if name in fractions:
-            found[name] = own.at(fractions[name], STEP.get(name, 0))
-        else:
-            found[name] = np.full(count, (others or {}).get(name, own.values[0]))
+    sizes = [count, *[max(1, round(SHARE * count))] * ROUNDS]
+    open_sizes = max(len(study.varied), 1)
+    middle: Floats | float = 0.5
+    reach, found, fractions = 0.5, None, np.empty((0, open_sizes))
+    for number, size in enumerate(sizes):
+        u = qmc.Sobol(open_sizes, rng=number).random_base2(int(np.ceil(np.log2(size))))[:size]
+        near = np.clip(middle + 2.0 * reach * (u - 0.5), 0.0, 1.0)
+        dimensions, new = _distinct(study, near, found)
+        if not len(new):
+            break
+        done = sum(sizes[:number])
+        told = None if progress is None else partial(_told, progress, done, sum(sizes))
+        own = tried(study, dimensions, worlds, told)
+        found = own if found is None else found.joined(own)
+        fractions = np.concatenate([fractions, new])
+        middle, reach = fractions[best_design(study, found)], REACH * SHRINK**number
+    assert found is not None
     return found
+
+
+def _told(progress: Callable[[int, int], None], before: int, total: int, done: int) -> None:
+    progress(min(before + done, total), total)
+
+
+def _distinct(
+    study: DesignStudy, fractions: Floats, known: Designs | None
+) -> tuple[dict[str, Floats], Floats]:
+    """Dimensions of the designs at fractions (k, d) that are not known yet, and their fractions."""
+    values = {name: own.at(np.zeros(len(fractions))) for name, own in study.dimensions.items()}
+    values |= {n: study.dimensions[n].at(fractions[:, i]) for i, n in enumerate(study.varied)}
+    rows = np.stack(list(values.values()), axis=1)
+    earlier = np.empty((0, rows.shape[1]))
+    if known is not None:
+        earlier = np.stack([known.dimensions[name] for name in values], axis=1)
+    whole = np.concatenate([earlier, rows]).round(12)
+    first = np.sort(np.unique(whole, axis=0, return_index=True)[1])
+    new = first[first >= len(earlier)] - len(earlier)
+    return {name: column[new] for name, column in values.items()}, fractions[new]
 
 
 def tried(
@@ -148,16 +133,32 @@ def tried(
     worlds: DrawnWorlds,
     progress: Callable[[int], None] | None = None,
 ) -> Designs:
-    """Designs with these dimensions (k,), on the slips of a sweep."""
+    """Designs with these dimensions (k,), on the slips of a sweep, by several processes.
+
+    progress: Given the number of designs done.
+    """
     count = len(dimensions["radius"])
-    results: dict[str, Floats] = {}
+    axles = max(1, int(dimensions["wheels"].max()) // 2)
+    most = max(1, BLOCK_ROWS // (worlds.count * len(SWEPT) * axles))
+    size = max(1, min(most, count // usable_cores()))
+    blocks = [
+        {name: column[i : i + size] for name, column in dimensions.items()}
+        for i in range(0, count, size)
+    ]
+    parts: list[dict[str, Floats]] = []
+    with process_map(partial(_results, study, worlds), blocks) as results:
+        for part in results:
+            parts.append(part)
+            if progress is not None:
+                progress(min(size * len(parts), count))
+    joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    return Designs(dict(dimensions), joined)
 
-    def keep(block: NDArray[np.int64], found: Outcomes) -> None:
-        for key, values in summary(study, found).items():
-            results.setdefault(key, np.empty(count))[block] = values
 
-    in_blocks(study, dimensions, worlds, keep, progress)
-    return Designs(dict(dimensions), results)
+def _results(
+    study: DesignStudy, worlds: DrawnWorlds, designs: Mapping[str, Floats]
+) -> dict[str, Floats]:
+    return summary(study, evaluate(study, designs, worlds, shares=SWEPT))
 
 
 def summary(study: DesignStudy, found: Outcomes) -> dict[str, Floats]:
@@ -187,85 +188,9 @@ def quantile_of_worlds(values: Floats, fraction: float) -> Floats:
     return np.where(number > 0, picked, np.nan)
 
 
-def optimised(
-    study: DesignStudy,
-    worlds: DrawnWorlds,
-    start: Designs,
-    progress: Callable[[int], None] | None = None,
-) -> Designs:
-    """Designs of an optimisation from the best of a sweep, by differential evolution.
-
-    It makes the goal's `least` least among designs that meet the goal at its risk, in the same
-    worlds as the sweep; where none does, it raises the probability.
-
-    References: Storn and Price, J. Global Optim. 11(4), 1997.
-    """
-    need("scipy", "design")
-    from scipy.optimize import differential_evolution
-
-    names = study.varied
-    found = start
-    done = 0
-
-    def cost(x: Floats) -> Floats:
-        nonlocal found, done
-        points = np.atleast_2d(np.asarray(x).T)
-        fractions = {name: points[:, i] for i, name in enumerate(names)}
-        own = tried(study, at_fractions(study, fractions), worlds)
-        found = found.joined(own)
-        done += len(points)
-        if progress is not None:
-            progress(done)
-        return _cost(study, own, start)
-
-    best = best_design(study, start)
-    first = [_fraction(study, name, float(start.dimensions[name][best])) for name in names]
-    differential_evolution(
-        cost,
-        [(0.0, 1.0)] * len(names),
-        x0=first,
-        popsize=POPULATION,
-        maxiter=GENERATIONS,
-        polish=False,
-        vectorized=True,
-        updating="deferred",
-        rng=np.random.default_rng(0),
-        tol=1e-3,
-    )
-    return found
-
-
-def optimised_count(study: DesignStudy) -> int:
-    """Designs that an optimisation tries at most."""
-    return max(POPULATION * len(study.varied), 5) * (GENERATIONS + 1)
-
-
-def _fraction(study: DesignStudy, name: str, value: float) -> float:
-    own = study.dimensions[name]
-    low, high = own.values[0], own.values[-1]
-    if not own.searched:
-        return (own.values.index(value) + 0.5) / len(own.values)
-    if name in STEP:
-        return ((value - low) / STEP[name] + 0.5) / (round((high - low) / STEP[name]) + 1)
-    return (value - low) / (high - low)
-
-
-def _cost(study: DesignStudy, own: Designs, sweep: Designs) -> Floats:
-    """Below 1 for designs that meet the goal, by what is to be least; above 1 for others, (k,)."""
-    goal = study.goal
-    of_sweep = sweep.least_of(goal.least)
-    ends = np.nanmin(of_sweep), np.nanmax(np.where(np.isfinite(of_sweep), of_sweep, -np.inf))
-    extent = max(float(ends[1] - ends[0]), 1e-12)
-    least = np.clip((own.least_of(goal.least) - ends[0]) / extent, -1.0, 1.0)
-    shortfall = np.maximum(1.0 - goal.risk - own.results["probability"], 0.0)
-    shortfall = shortfall + ~own.lugs_suffice
-    return np.asarray(np.where(shortfall > 0.0, 1.0 + shortfall, 0.5 + 0.49 * least))
-
-
 def meets(study: DesignStudy, designs: Designs) -> NDArray[np.bool_]:
     """Designs (k,) that meet the goal with the probability that its risk leaves."""
-    enough = designs.results["probability"] >= 1.0 - study.goal.risk - SAME
-    return np.asarray(enough & designs.lugs_suffice)
+    return np.asarray(designs.results["probability"] >= 1.0 - study.goal.risk - SAME)
 
 
 def best_design(study: DesignStudy, designs: Designs) -> int:
@@ -274,22 +199,17 @@ def best_design(study: DesignStudy, designs: Designs) -> int:
     Among equals, the one with the larger margin at the goal's risk.
     """
     found = meets(study, designs)
-    margin = designs.results["margin_at_risk_N"]
+    margin, probability = (designs.results[key] for key in ("margin_at_risk_N", "probability"))
     if found.any():
-        keys = (-margin, designs.least_of(study.goal.least), ~found)
-    else:
-        keys = (-margin, -designs.results["probability"], ~designs.lugs_suffice)
-    return int(np.lexsort(keys)[0])
+        return int(np.lexsort((-margin, designs.least_of(study.goal.least), ~found))[0])
+    return int(np.lexsort((-margin, -probability))[0])
 
 
 def pareto_front(study: DesignStudy, designs: Designs) -> NDArray[np.int64]:
-    """Designs that no other one beats in both margin at risk and what is to be least, ordered.
-
-    Those whose lugs do not suffice are left out.
-    """
+    """Designs that no other one beats in both margin at risk and what is to be least, ordered."""
     gain = designs.results["margin_at_risk_N"]
     least = designs.least_of(study.goal.least)
-    usable = np.flatnonzero(designs.lugs_suffice & np.isfinite(gain) & np.isfinite(least))
+    usable = np.flatnonzero(np.isfinite(gain) & np.isfinite(least))
     order = usable[np.lexsort((-gain[usable], least[usable]))]
     front: list[int] = []
     highest = -np.inf

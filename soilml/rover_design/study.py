@@ -15,7 +15,7 @@ from soilml.arrays import Floats
 from soilml.config.model_settings import take_soil
 from soilml.config.wheeled_rover import GravityByName, RoverWheel, WheeledRover, read_gravity
 from soilml.errors import InputError
-from soilml.io.declared_settings import OneOf, in_si, take_declared, take_quantity
+from soilml.io.declared_settings import Numbers, OneOf, in_si, take_declared
 from soilml.io.named_files import NO_FILES, NamedFiles
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
@@ -29,12 +29,9 @@ DIMENSIONS = {
     "radius": Parameter("m", 0.005, 2.0, "radius of the rim"),
     "width": Parameter("m", 0.005, 2.0, "width of a wheel"),
     "lug_height": Parameter("m", 0.0, 0.2, "height of a lug above the rim"),
-    "lug_count": Parameter("1", 1, 500, "lugs on a wheel"),
     "wheels": Parameter("1", 4, 40, "wheels, all driven, in pairs"),
     "mass": Parameter("kg", 0.01, 1e5, "mass of the whole rover"),
 }
-WHOLE = ("lug_count", "wheels")  # Dimensions that are counted
-STEP = {"lug_count": 1, "wheels": 2}  # Steps of their ranges
 #: What a goal may ask to be least among the designs that meet it.
 LEAST = ("energy", "torque", *DIMENSIONS)
 SLIP_LIMIT, RISK = 0.6, 0.05  # Defaults: those of `pull` and of its 90 % bands
@@ -42,26 +39,96 @@ SLIP_LIMIT, RISK = 0.6, 0.05  # Defaults: those of `pull` and of its 90 % bands
 
 @dataclass(frozen=True)
 class Dimension:
-    """A dimension of a design: some values (m,), or all between two of them (`searched`)."""
+    """A dimension of a design: some values (m,), or all between two of them (`searched`).
+
+    step: Between the values of a range; 0 for any.
+    """
 
     values: tuple[float, ...]
     searched: bool = False
+    step: int = 0
 
     @property
     def varied(self) -> bool:
         """Whether there is more than one design by it."""
         return len(self.values) > 1
 
-    def at(self, fraction: Floats, step: int = 0) -> Floats:
-        """Values at fractions (k,) from 0 to 1 of the range, or of the list; whole by `step`."""
+    def at(self, fraction: Floats) -> Floats:
+        """Values at fractions (k,) from 0 to 1 of the range, or of the list."""
         low, high = self.values[0], self.values[-1]
-        if not self.searched:
-            index = np.minimum((fraction * len(self.values)).astype(int), len(self.values) - 1)
-            return np.asarray(np.asarray(self.values, dtype=np.float64)[index])
-        if step:
-            count = round((high - low) / step)
-            return np.asarray(low + step * np.minimum(np.floor(fraction * (count + 1)), count))
-        return np.asarray(low + (high - low) * fraction)
+        if self.searched and not self.step:
+            return np.asarray(low + (high - low) * fraction)
+        values: Floats = np.asarray(self.values, dtype=np.float64)
+        if self.searched:
+            values = np.arange(low, high + 0.5, self.step)
+        index = np.minimum((fraction * len(values)).astype(int), len(values) - 1)
+        return np.asarray(values[index])
+
+
+class OpenSize:
+    """A number, a range [lower, upper], or { values = [...] }; texts may have a unit."""
+
+    def take(self, settings: Settings, key: str, kind: str) -> Dimension:
+        """The values of one of `DIMENSIONS`."""
+        bounds = DIMENSIONS[key]
+        unit = f" in {bounds.unit}" if bounds.unit != "1" else ""
+        needed = f"a number{unit}, a range [lower, upper], or {{ values = [...] }} ({bounds.text})"
+        given = settings.take(key, (int, float, str, list, dict), needed)
+        searched = isinstance(given, list)
+        listed = given.get("values") if isinstance(given, dict) else given
+        listed = listed if isinstance(listed, list) else [listed]
+        wrong = isinstance(given, dict) and given.keys() != {"values"}
+        if wrong or not listed or not all(map(_is_size, listed)):
+            settings.fail(f"{key} is {given!r}; needed is {needed}")
+        numbers = [in_si(settings, key, v, bounds.unit) for v in listed]
+        if searched and not (len(numbers) == 2 and numbers[0] < numbers[1]):
+            settings.fail(f"{key} is {listed!r}; needed is {needed}, with lower below upper")
+        for value in numbers:
+            if not bounds.lower <= value <= bounds.upper:
+                settings.fail(
+                    f"{key} is {value:g}{unit.removeprefix(' in')}; needed is {bounds.lower:g} to "
+                    f"{bounds.upper:g}"
+                )
+            if key == "wheels" and value % 2 != 0.0:
+                settings.fail(
+                    f"{key} is {value:g}; needed is an even number, since wheels stand in pairs"
+                )
+        values = tuple(numbers if searched else sorted(set(numbers)))
+        return Dimension(values, searched, 2 if key == "wheels" else 0)
+
+
+def _is_size(value: Any) -> bool:
+    return isinstance(value, int | float | str) and not isinstance(value, bool)
+
+
+@dataclass(frozen=True)
+class _RoverTable:
+    """The table [rover] of a question."""
+
+    mass: Annotated[Dimension, OpenSize()]
+    wheels: Annotated[Dimension, OpenSize()]
+    wheelbase: Annotated[float, Parameter("m", 0.001, 100.0, "from the first axle to the last")]
+    centre_of_mass: Annotated[
+        tuple[float, float],
+        Numbers("[ahead of the middle, above the ground] in m, up to 100", 2, -100, 100),
+    ]
+    gravity: Annotated[float, GravityByName()]
+
+    def __post_init__(self) -> None:
+        """Raise `InputError` for a centre of mass below the ground."""
+        if self.centre_of_mass[1] < 0.0:
+            raise InputError(
+                f"centre_of_mass is {list(self.centre_of_mass)}; its height cannot be negative"
+            )
+
+
+@dataclass(frozen=True)
+class _WheelTable:
+    """The table [wheel] of a question."""
+
+    radius: Annotated[Dimension, OpenSize()]
+    width: Annotated[Dimension, OpenSize()]
+    lug_height: Annotated[Dimension, OpenSize()]
 
 
 @dataclass(frozen=True)
@@ -112,7 +179,7 @@ class SoilQuestion:
 class DesignStudy:
     """A rover whose dimensions are open within limits, the soils that it may meet, and its goal.
 
-    dimensions: By name, as in `DIMENSIONS`; `lug_count` is absent where it is not judged.
+    dimensions: By name, as in `DIMENSIONS`.
     wheelbase: Distance of the first axle from the last, m; axles between are evenly spaced.
     centre_of_mass: How far it is ahead of the middle of the wheelbase, and above the ground, m.
     gravity: In m/s^2.
@@ -153,30 +220,15 @@ def read_study(path: str | os.PathLike[str], files: NamedFiles | None = None) ->
     out of bounds: nothing of a rover is assumed.
     """
     settings = read_settings(path, files=files)
-    rover, wheel = settings.table("rover"), settings.table("wheel")
-    dimensions = {
-        "mass": _take_dimension(rover, "mass"),
-        "wheels": _take_dimension(rover, "wheels"),
-    }
-    wheelbase = take_quantity(rover, "wheelbase", "m")
-    centre = _take_pair(rover, "centre_of_mass", "[ahead of the middle, above the ground] in m")
-    gravity = GravityByName().take(rover, "gravity", "")
-    rover.finish()
-    for name in ("radius", "width", "lug_height"):
-        dimensions[name] = _take_dimension(wheel, name)
-    if "lug_count" in wheel:
-        dimensions["lug_count"] = _take_dimension(wheel, "lug_count")
-    wheel.permit(DIMENSIONS)
-    wheel.finish()
-    if not 0.0 < wheelbase <= 100.0:
-        rover.fail(f"wheelbase is {wheelbase:g} m; needed is a length above zero, up to 100")
-    if centre[1] < 0.0:
-        rover.fail(f"centre_of_mass is {list(centre)}; its height cannot be negative")
+    rover = take_declared(_RoverTable, settings.table("rover"))
+    wheel = take_declared(_WheelTable, settings.table("wheel"))
+    sizes = {"radius": wheel.radius, "width": wheel.width, "lug_height": wheel.lug_height}
+    sizes |= {"wheels": rover.wheels, "mass": rover.mass}
     study = DesignStudy(
-        {name: dimensions[name] for name in DIMENSIONS if name in dimensions},
-        wheelbase,
-        centre,
-        gravity,
+        {name: sizes[name] for name in DIMENSIONS},
+        rover.wheelbase,
+        rover.centre_of_mass,
+        rover.gravity,
         _take_soil(settings.table("soil")),
         take_declared(ClimbingGoal, settings.table("goal")),
     )
@@ -203,50 +255,6 @@ def with_changes(
     return study
 
 
-def _take_dimension(settings: Settings, name: str) -> Dimension:
-    """A number, a range [lower, upper], or { values = [...] }; texts may have a unit."""
-    bounds = DIMENSIONS[name]
-    unit = f" in {bounds.unit}" if bounds.unit != "1" else ""
-    needed = f"a number{unit}, a range [lower, upper], or {{ values = [...] }} ({bounds.text})"
-    given = settings.take(name, (int, float, str, list, dict), needed)
-    searched = isinstance(given, list)
-    if isinstance(given, dict):
-        values = given.get("values")
-        if given.keys() != {"values"} or not isinstance(values, list) or not values:
-            settings.fail(f"{name} is {given!r}; needed is {needed}")
-        given = values
-    listed = given if isinstance(given, list) else [given]
-    if not all(isinstance(v, int | float | str) and not isinstance(v, bool) for v in listed):
-        settings.fail(f"{name} is {listed!r}; needed is {needed}")
-    numbers = [in_si(settings, name, v, bounds.unit) for v in listed]
-    if searched and not (len(numbers) == 2 and numbers[0] < numbers[1]):
-        settings.fail(f"{name} is {listed!r}; needed is {needed}, with lower below upper")
-    for value in numbers:
-        if not bounds.lower <= value <= bounds.upper:
-            settings.fail(
-                f"{name} is {value:g}{unit.removeprefix(' in')}; needed is {bounds.lower:g} to "
-                f"{bounds.upper:g}"
-            )
-        if name in WHOLE and (value % STEP[name] != 0.0):
-            even = "an even number, since wheels stand in pairs" if name == "wheels" else "whole"
-            settings.fail(f"{name} is {value:g}; needed is {even}")
-    return Dimension(tuple(numbers if searched else sorted(set(numbers))), searched)
-
-
-def _take_pair(settings: Settings, key: str, needed: str) -> tuple[float, float]:
-    values = settings.take(key, list, needed)
-    if len(values) != 2:
-        settings.fail(f"{key} is {values!r}; needed is {needed}")
-    first, second = (in_si(settings, key, v, "m") if _is_size(v) else math.nan for v in values)
-    if not (abs(first) <= 100.0 and abs(second) <= 100.0):
-        settings.fail(f"{key} is {values!r}; needed is {needed}")
-    return first, second
-
-
-def _is_size(value: Any) -> bool:
-    return isinstance(value, int | float | str) and not isinstance(value, bool)
-
-
 def _take_soil(settings: Settings) -> SoilQuestion:
     """One soil as in a model file, `names` of published ones, or `model` with `runs`."""
     if "model" in settings or "runs" in settings:
@@ -254,33 +262,30 @@ def _take_soil(settings: Settings) -> SoilQuestion:
         settings.finish()
         named = None if settings.files.folder is not None else NO_FILES
         return SoilQuestion(rows=rows, named=named)
-    if "names" not in settings:
-        name = settings.content.get("name")
-        own, prior, tests = take_soil(settings)
-        if not isinstance(name, str):
-            return SoilQuestion({}, own, prior, tests)
-        entry = replace(soil_catalogue()[name], soil=own)
-        stated = settings.content.keys()
-        spread = {k: v for k, v in entry.spread.items() if k not in stated}
-        assumed = tuple(k for k in entry.assumed if k not in stated and k not in prior)
-        return SoilQuestion(
-            {name: replace(entry, spread=spread, assumed=assumed)}, None, prior, tests
-        )
-    names = settings.take("names", list, "a list of published soils, see `soilml show soils`")
-    base = Settings({k: v for k, v in settings.content.items() if k != "names"}, settings.where,
-                    settings.files)  # fmt: skip
-    if not names or not all(isinstance(name, str) for name in names):
-        settings.fail(f"names is {names!r}; needed is a list of published soils")
+    content = dict(settings.content)
+    if "names" in content:
+        names = content.pop("names")
+        if not (names and isinstance(names, list) and all(isinstance(n, str) for n in names)):
+            settings.fail(f"names is {names!r}; needed is a list of published soils")
+    else:
+        names = [settings.text("name")] if "name" in settings else []
     try:
-        found = _published(names)
+        entries = dict(_published(names).entries)
     except InputError as error:
         settings.fail(str(error))
-    base.content["name"] = names[0]
-    _, prior, tests = take_soil(Settings(base.content, settings.where, settings.files))
-    others = base.content.keys() - {"name", "prior", "test"}
-    if others:
-        settings.fail(f"{sorted(others)[0]} is of one soil; for all of names write [soil.prior]")
-    return replace(found, prior=prior, tests=tests)
+    one = content | ({"name": names[0]} if names else {})
+    own, prior, tests = take_soil(Settings(one, settings.where, settings.files))
+    if not names:
+        return SoilQuestion({}, own, prior, tests)
+    stated = content.keys() - {"name", "prior", "test"}
+    if len(names) == 1:
+        entry = entries[names[0]]
+        spread = {k: v for k, v in entry.spread.items() if k not in stated}
+        assumed = tuple(k for k in entry.assumed if k not in stated and k not in prior)
+        entries = {names[0]: replace(entry, soil=own, spread=spread, assumed=assumed)}
+    elif stated:
+        settings.fail(f"{sorted(stated)[0]} is of one soil; for all of names write [soil.prior]")
+    return SoilQuestion(entries, None, prior, tests)
 
 
 def _published(names: list[str]) -> SoilQuestion:

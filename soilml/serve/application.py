@@ -5,17 +5,15 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from importlib import resources
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from tornado.web import Application, StaticFileHandler, stream_request_body
 
 from soilml.errors import InputError
-from soilml.serve.chosen_case import choices
-from soilml.serve.forward_curves import controls, forward
+from soilml.serve.forward import choices, controls, forward
 from soilml.serve.guarded_handler import GuardedHandler, RefusedError
-from soilml.serve.job_commands import EFFORTS, KINDS, WITHOUT_FILES
+from soilml.serve.job_commands import KINDS, WITHOUT_FILES
 from soilml.serve.jobs import Jobs
 from soilml.serve.uploads import LARGEST_FILE, Upload, Uploads
 
@@ -77,17 +75,11 @@ class Static(GuardedHandler, StaticFileHandler):
 
 
 class Choices(GuardedHandler):
-    """Wheels, soils and limits to choose from."""
+    """Gears and soils to choose from."""
 
     def get(self) -> None:
         """Answer."""
-        study = (
-            resources.files("soilml.rover_design")
-            .joinpath("example.toml")
-            .read_text(encoding="utf-8")
-        )
-        more = {"largest_file": LARGEST_FILE, "efforts": list(EFFORTS), "question": study}
-        self.answer(choices() | more)
+        self.answer(choices() | {"largest_file": LARGEST_FILE})
 
 
 class Question(GuardedHandler):
@@ -178,10 +170,9 @@ class StartJob(GuardedHandler):
         request = self.content()
         kind = request.pop("kind", None)
         keys = request.pop("files", None)
-        known = isinstance(kind, str) and (kind in KINDS or kind == "look")
+        known = isinstance(kind, str) and kind in KINDS
         if not known or not isinstance(keys, list) or not (keys or kind in WITHOUT_FILES):
-            names = ", ".join(["look", *KINDS])
-            raise RefusedError(400, f"needed is a kind ({names}) and a list of files")
+            raise RefusedError(400, f"needed is a kind ({', '.join(KINDS)}) and a list of files")
         files = [self._file(key) for key in keys]
         job = await self.jobs.start(kind, request | {"names": [f.name for f in files]}, files)
         self.answer(job.as_json())

@@ -25,20 +25,6 @@ HEADERS = {
     "Cache-Control": "no-store",
 }
 _READING = ("GET", "HEAD")  # Methods that only read
-
-
-#: What a part of a request must be; each may be missing, or null.
-_PARTS: dict[str, type] = {
-    "wheel": str,
-    "model": str,
-    "values": dict,
-    "run": str,
-    "map": str,
-    "sheet": str,
-    "question": str,
-    "soil": str,
-}
-_KINDS: dict[type, str] = {str: "a text", dict: "an object"}
 #: What is said with a status that the server's library answers; others below 500 have the first.
 _REFUSALS = {
     400: "the request is malformed",
@@ -54,13 +40,6 @@ class RefusedError(HTTPError):
     def __init__(self, status: int, text: str) -> None:
         super().__init__(status, text.replace("%", "%%"))
         self.text = text
-
-
-def check_parts(request: dict[str, Any]) -> None:
-    """Refuse a request with a part of another type."""
-    for name, kind in _PARTS.items():
-        if not isinstance(request.get(name), kind | None):
-            raise RefusedError(400, f"{name}: needed is {_KINDS[kind]}")
 
 
 class GuardedHandler(RequestHandler):
@@ -98,7 +77,7 @@ class GuardedHandler(RequestHandler):
             raise RefusedError(415, "a body must be application/json or application/octet-stream")
 
     def content(self) -> dict[str, Any]:
-        """The request's body, a JSON object whose parts are what `check_parts` says."""
+        """The request's body, a JSON object."""
         try:
             found = json.loads(self.request.body, parse_int=float)
             json.dumps(found, ensure_ascii=False).encode()  # texts that can be written to a file
@@ -106,7 +85,6 @@ class GuardedHandler(RequestHandler):
             found = None
         if not isinstance(found, dict):
             raise RefusedError(400, "the request is no JSON object")
-        check_parts(found)
         return found
 
     def answer(self, content: Any) -> None:

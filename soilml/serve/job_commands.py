@@ -5,22 +5,23 @@ The page shows what the command writes, so that both say the same.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from soilml.errors import InputError
-from soilml.io.named_files import NO_FILES, NamedFiles
+from soilml.io.named_files import NO_FILES
 
 #: Folders of a job: of the files that it reads, in which it works, and of what it writes. No
 #: written file can replace a read one, and a dropped file may have any name.
 READ, WRITTEN = "read", "found"
 #: Names of the texts of the page, by which messages call them.
-MODEL_FILE, STUDY_FILE, MAP_FILE = "MODEL.toml", "rover.toml", "map.toml"
+MODEL_FILE, MAP_FILE = "MODEL.toml", "map.toml"
 OUT = f"../{WRITTEN}"
-#: Designs of the sweep and draws, by how thorough the answer is: the last is the command's default.
-EFFORTS = {"quick": (60, 300), "normal": (100, 500), "thorough": (250, 1000)}
+LOOKED = f"{OUT}/look.json"  # What `look` finds
+COMMAND = "$ "  # Begins the line in which a worker says what it runs
 #: Columns by two of which a table of runs is known, where no column is a clock.
 _RUNS, _CLOCKS = {"slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m"}, {"time", "t"}
 
@@ -28,12 +29,19 @@ _RUNS, _CLOCKS = {"slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m"},
 def command_of(request: Mapping[str, Any]) -> list[str]:
     """The words of the command of a request; writes the texts of the page beside the files.
 
-    Raises `InputError` for a text that names other files than those of the page.
+    There are none for a look at files. Raises `InputError` for a text that names other files than
+    those of the page.
     """
     return KINDS[request["kind"]](request)
 
 
-def look(request: Mapping[str, Any]) -> dict[str, Any]:
+def _look(request: Mapping[str, Any]) -> list[str]:
+    """Write what the dropped files are."""
+    Path(LOOKED).write_text(json.dumps(_kind(request)), encoding="utf-8")
+    return []
+
+
+def _kind(request: Mapping[str, Any]) -> dict[str, Any]:
     """The kind of the dropped files: a table of runs, logs, or a spreadsheet of several sheets."""
     from soilml.io.read_table import RUNS, read_table
     from soilml.io.spreadsheet import is_spreadsheet, sheet_rows, sheets_with_cells, split_sheet
@@ -89,25 +97,6 @@ def _import(request: Mapping[str, Any]) -> list[str]:
     return ["import", *request["names"], "--map", MAP_FILE, "--out", out, *accept]
 
 
-def _wheels(request: Mapping[str, Any]) -> list[str]:
-    from soilml.config.case import read_case
-    from soilml.rover_design.study import read_study
-
-    names = request["names"]
-    if request.get("model"):
-        model = _text_file(MODEL_FILE, request["model"])
-        read_case(model, with_bias=True, files=NO_FILES, with_explanations=True)
-        names = [*names, model.name]
-    files = NamedFiles(names=names, hint="drop the table of runs first")
-    read_study(_text_file(STUDY_FILE, request.get("question")), files)
-    effort = request.get("effort", "normal")
-    if not isinstance(effort, str) or effort not in EFFORTS:
-        raise InputError(f"effort is {effort!r}; needed is one of {', '.join(EFFORTS)}")
-    designs, draws = map(str, EFFORTS[effort])
-    words = ["plan", "wheels", STUDY_FILE, "--designs", designs, "--draws", draws]
-    return [*words, "--report", OUT]
-
-
 def _init(request: Mapping[str, Any]) -> list[str]:
     """A first model file for a wheel of these sizes, m; without a soil its bearing is unknown."""
     words = ["init", f"{OUT}/{MODEL_FILE}"]
@@ -130,14 +119,14 @@ def _text_file(name: str, text: object) -> Path:
 
 #: Words of the command by the kind of a job.
 KINDS: Mapping[str, Callable[[Mapping[str, Any]], list[str]]] = {
+    "look": _look,
     "identify": lambda r: ["identify", *_model_and_rows(r), "--report", OUT],
     "gap": lambda r: ["gap", *_model_and_rows(r), "--out", OUT],
     "pull": lambda r: ["pull", *_model_and_rows(r), "--report", OUT],
     "draft": lambda r: ["import", "--init", *r["names"], "--out", f"{OUT}/{MAP_FILE}"],
     "import": _import,
-    "wheels": _wheels,
     "init": _init,
     "example": lambda _: ["example", OUT],
 }
 #: Kinds of jobs that read no dropped file.
-WITHOUT_FILES = ("wheels", "init", "example")
+WITHOUT_FILES = ("init", "example")

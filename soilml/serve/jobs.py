@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 import secrets
 import shutil
 import signal
@@ -15,11 +16,14 @@ from pathlib import Path
 from typing import Any
 
 from soilml.errors import InputError
-from soilml.serve.job_commands import READ, WRITTEN
+from soilml.serve.job_commands import COMMAND, LOOKED, READ, WRITTEN
 
 _MOST_JOBS = 24  # Jobs that are remembered; the oldest are forgotten with their files
-#: Longest line of a worker, bytes: an answer with its pictures and tables.
-_LONGEST_LINE = 64 << 20
+#: What commands write to standard error: progress in per cent, remarks, and what they refuse.
+_SHARE = re.compile(r"(.*): (\d+) %(.*)")
+_REMARK = "! "
+_PROGRAM = re.compile(r"^soilml[\w -]*: ")
+_REFUSED, _ANSWERED = 2, (0, 3)  # Exit status of a command; 3: data that cannot be analysed
 _CRASHED = "the analysis ended without an answer: the machine may have too little memory"
 
 
@@ -31,12 +35,37 @@ class Job:
     kind: str
     folder: Path
     state: str = "running"  # done, failed, cancelled
+    command: str = ""
+    remarks: list[str] = field(default_factory=list)
     stage: str = "starting"
     share: float | None = None
     result: Any = None
     error: str = ""
     process: asyncio.subprocess.Process | None = None
     task: asyncio.Task[None] | None = field(default=None, repr=False)
+
+    def take(self, line: str) -> None:
+        """Take a line of the command: what it is, a remark, or its present stage."""
+        if line.startswith(COMMAND):
+            self.command = line[len(COMMAND) :]
+            self.stage = " ".join([*self.command.split()[:2], "..."])
+        elif line.startswith(_REMARK):
+            self.remarks.append(line[len(_REMARK) :])
+        else:
+            found = _SHARE.fullmatch(line)
+            self.share = None if found is None else int(found[2]) / 100.0
+            self.stage = line if found is None else f"{found[1]}{found[3]}"
+
+    def end(self, status: int, last: str) -> None:
+        """Take the exit status of the command, and its last line, by which it refuses."""
+        if status not in _ANSWERED:
+            self.state, self.error = "failed", last if status == _REFUSED else _CRASHED
+            return
+        files = {path.name: path for path in (self.folder / WRITTEN).iterdir() if path.is_file()}
+        self.state = "done"
+        self.result = {"command": self.command, "files": sorted(files), "remarks": self.remarks}
+        if self.kind == "look":
+            self.result = json.loads(files[Path(LOOKED).name].read_text(encoding="utf-8"))
 
     def as_json(self) -> dict[str, Any]:
         """What the page asks for again and again."""
@@ -109,44 +138,30 @@ class Jobs:
     async def _follow(self, job: Job, request: dict[str, Any]) -> None:
         """Start the process, and take what it says until it ends."""
         command = [sys.executable, "-m", "soilml.serve.worker", str(job.folder / READ)]
-        pipe = asyncio.subprocess.PIPE
         process = await asyncio.create_subprocess_exec(
             *command,
-            stdin=pipe,
-            stdout=pipe,
-            stderr=asyncio.subprocess.DEVNULL,
-            limit=_LONGEST_LINE,
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.DEVNULL,
+            stderr=asyncio.subprocess.PIPE,
+            limit=1 << 20,  # bytes of a line
             start_new_session=True,  # Ctrl-C is for the server, which ends its workers
         )
         job.process = process
         if job.state != "running":  # cancelled while it started
             _kill(process)
-        assert process.stdin is not None and process.stdout is not None
-        try:
+        assert process.stdin is not None and process.stderr is not None
+        with contextlib.suppress(OSError):  # it has ended already
             process.stdin.write(json.dumps(request).encode() + b"\n")
             await process.stdin.drain()
-            while line := await process.stdout.readline():
-                self._take(job, json.loads(line))
-        except (OSError, ValueError) as error:
-            if job.state == "running":
-                job.state, job.error = "failed", f"{_CRASHED} ({type(error).__name__})"
-        finally:
-            # the pipe stays open until here: a worker ends when the server does
-            process.stdin.close()
-            await process.wait()
+        last = ""
+        while line := await process.stderr.readline():
+            last = line.decode(errors="replace").rstrip("\n")
+            job.take(last)
+        # the pipe stays open until here: a worker ends when the server does
+        process.stdin.close()
+        status = await process.wait()
         if job.state == "running":
-            job.state, job.error = "failed", _CRASHED
-
-    @staticmethod
-    def _take(job: Job, said: dict[str, Any]) -> None:
-        if job.state != "running":
-            return
-        if "stage" in said:
-            job.stage, job.share = said["stage"], said.get("share")
-        elif "error" in said:
-            job.state, job.error = "failed", said["error"]
-        elif "result" in said:
-            job.state, job.result = "done", said["result"]
+            job.end(status, _PROGRAM.sub("", last))
 
 
 def _kill(process: asyncio.subprocess.Process) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.config.wheeled_rover import DriveErrors
 from soilml.numerics.prior import Prior
-from soilml.numerics.quantiles import effective_size, weighted_quantiles
+from soilml.numerics.quantiles import weighted_quantiles
 from soilml.slip_filter.force_table import ForceTable
 
 CHANGE = 0.01  # Probability that a row is on another soil than the row before
@@ -54,7 +54,6 @@ class SlipAnswer:
     no_soil: float  # Probability of a hard floor
     beyond: float  # Probability that the slip is above the largest of the table
     misfit: float  # Mean square of the residuals over their variance, 1 on average or less
-    effective: float  # Effective number of soils
     mean: float  # Of the speed, m/s
     std: float  # Standard deviation of the speed, m/s
 
@@ -268,7 +267,6 @@ class SlipFilter:
             no_soil,
             float(weight[missing > 0.0].sum()),
             misfit,
-            effective_size(weight),
             mean,
             float(np.sqrt(weight @ (speed - mean) ** 2)),
         )

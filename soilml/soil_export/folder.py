@@ -12,20 +12,23 @@ from typing import Any
 from soilml.errors import InputError, did_you_mean
 from soilml.io.atomic_files import write_files
 from soilml.io.text_tables import csv_text
-from soilml.parameters import unit_text
+from soilml.parameters import declared, unit_text
+from soilml.physics.soils import Soil
 from soilml.remarks import Remark
-from soilml.report.numbers import significant
 from soilml.report.page import Content, Provenance, json_text
+from soilml.report.report import Report
+from soilml.report.tables import Column, ReportTable
+from soilml.results import Result
 from soilml.soil_export.source_soil import SourceSoil, read_source_soil
 from soilml.soil_export.targets import TARGETS, SoilTarget
 
-README, RECORD, DRAWS = "README.md", "export.json", "draws.csv"
+README, RECORD, DRAWS = "README.txt", "export.json", "draws.csv"
 FORMAT_VERSION = 1  # Raised where a key of export.json changes its meaning or goes
 MOST_DRAWS = 9999
 
 
-@dataclass(frozen=True)
-class SoilExport:
+@dataclass(frozen=True, repr=False)
+class SoilExport(Result):
     """A soil in the terms of a program.
 
     target: The program.
@@ -57,7 +60,7 @@ class SoilExport:
             columns = {name: [draw[name] for draw in self.draws] for name in self.values}
             files[DRAWS] = csv_text(columns)
         names = [*files, README, RECORD]
-        files[README] = readme(self, names)
+        files[README] = f"{self.report().text(details=True)}\n"
         files[RECORD] = json_text(self.as_json(names, Provenance.of(words, inputs)))
         return files
 
@@ -89,6 +92,59 @@ class SoilExport:
             if own.name == name:
                 return ", ".join(dict.fromkeys(self.known.origin[part] for part in own.soil))
         return "given" if name in self.given else "default"
+
+    def frame_columns(self) -> dict[str, Any]:
+        """A row for each parameter, in the units of the program."""
+        why = {own.name: own.equation for own in self.target.mapped}
+        why |= {
+            own.name: "given with --set" if own.name in self.given else own.reason
+            for own in self.target.asked
+        }
+        return {
+            "parameter": list(self.values),
+            "known from": [self.origin(name) for name in self.values],
+            "value": list(self.values.values()),
+            "unit": [unit_text(self.target.units[name]) for name in self.values],
+            "equation": [why[name] for name in self.values],
+        }
+
+    def report(self) -> Report:
+        """The parameters with their equations; how the program reads them, and what it ignores."""
+        target, known = self.target, self.known
+        columns = [Column(head, own, digits=6) for head, own in self.frame_columns().items()]
+        tables = [ReportTable("Parameters", columns)]
+        if known.intervals:
+            std, low, high = (list(ends) for ends in zip(*known.intervals.values(), strict=True))
+            bounds = declared(Soil)
+            identified = {
+                "parameter": list(known.intervals),
+                "mean": [known.values[name] for name in known.intervals],
+                "std": std,
+                "low": low,
+                "high": high,
+                "unit": [bounds[name].unit for name in known.intervals],
+            }
+            tables.append(ReportTable.of_parameters("Identified", identified))
+        details = [
+            ("How the program reads them", [target.loading]),
+            ("Ignored by the program", [f"{name}: {why}" for name, why in target.ignored.items()]),
+            ("What is lost", target.lost),
+            ("Sources", target.sources),
+        ]
+        draws = (
+            f"{len(self.draws)} equally likely soils keep the correlations of the parameters: "
+            f"simulate each, and take the spread of the results as that of the soil. {DRAWS} has a "
+            "row for each."
+        )
+        return Report(
+            kind="export",
+            verdict=f"Soil of {Path(known.source).name} for {target.program}.",
+            lines=[draws] if self.draws else [],
+            tables=tables,
+            remarks=self.remarks,
+            details=[(head, texts) for head, texts in details if texts],
+            title=f"Soil for {target.name}",
+        )
 
 
 def export_soil(
@@ -211,67 +267,3 @@ def _earlier(folder: Path) -> list[Path]:
         return []
     plain = [name for name in names if isinstance(name, str) and Path(name).name == name]
     return [folder / name for name in plain if (folder / name).is_file()]
-
-
-def readme(export: SoilExport, names: Sequence[str]) -> str:
-    """What the files of a folder are: equations, sources, defaults, what is ignored and lost."""
-    target, known = export.target, export.known
-    plain = [name for name in names if name not in (README, RECORD)]
-    shown = plain if len(plain) <= 5 else [*plain[:3], "...", plain[-1]]
-    lines = [
-        f"# Soil of {Path(known.source).name} for {target.name}",
-        "",
-        f"Written by `soilml export soil` for {target.program}.",
-        f"Files: {', '.join(f'`{name}`' if name != '...' else name for name in shown)}.",
-        "`export.json` has the same in a form for programs, with checksums of what was read.",
-        "",
-        "## How the program reads them",
-        "",
-        target.loading,
-        "## Parameters",
-        "",
-        "| parameter | value | unit | known from | equation |",
-        "|---|---|---|---|---|",
-    ]
-    parameters = [(own.name, own.unit, own.equation) for own in target.mapped]
-    parameters += [
-        (own.name, own.unit, "given with --set" if own.name in export.given else own.reason)
-        for own in target.asked
-    ]
-    for name, unit, why in parameters:
-        row = (f"`{name}`", significant(export.values[name], 6), unit, export.origin(name), why)
-        lines.append(f"| {' | '.join(row)} |")
-    lines += _intervals(known)
-    if target.ignored:
-        lines += ["", "## Ignored by the program", ""]
-        lines += [f"- `{name}`: {why}." for name, why in target.ignored.items()]
-    if target.lost:
-        lines += ["", "## What is lost", "", *(f"- {text}" for text in target.lost)]
-    if export.remarks:
-        lines += ["", "## Remarks", ""]
-        lines += [f"- {r.severity} `{r.code}`: {r}." for r in export.remarks]
-    if export.draws:
-        lines += [
-            "",
-            "## Draws",
-            "",
-            f"{len(export.draws)} equally likely soils, with the correlations of the parameters. "
-            "Simulate each, and take the spread of the results as that of the soil. `draws.csv` "
-            "has one row for each.",
-        ]
-    if target.sources:
-        lines += ["", "## Sources", "", *(f"- <{source}>" for source in target.sources)]
-    return "\n".join(lines) + "\n"
-
-
-def _intervals(known: SourceSoil) -> list[str]:
-    """The table of the identified parameters, in SI units."""
-    if not known.intervals:
-        return []
-    rows = [
-        f"| `{name}` | {significant(known.values[name])} | {significant(std)} | "
-        f"{significant(low)} to {significant(high)} |"
-        for name, (std, low, high) in known.intervals.items()
-    ]
-    head = ["", "Identified, in SI units:", "", "| parameter | value | std | 90 % interval |"]
-    return [*head, "|---|---|---|---|", *rows]

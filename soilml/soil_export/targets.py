@@ -55,7 +55,7 @@ class SoilTarget:
     ignored: Why it has no use for parameters of the soil, by name.
     files: By name, in which `{}` stands for the label of a draw: a text with values by the
         program's names, or what makes one of them.
-    loading: How the program reads the files, as Markdown.
+    loading: How the program reads the files.
     lost: What of the wheel's behaviour the program cannot show, in sentences.
     check: Raises `InputError` for values that the program would misread.
     """
@@ -121,7 +121,6 @@ def _angle(name: str, unit: str, equation: str, value: Callable[[float], float])
 
 
 _STRESS_ANGLE = "the pressure along the contact follows from depth, without an angle of its own"
-_NO_BEARING = "CRM has no pressure-sinkage law: bearing follows from density, friction and depth"
 _CHRONO = "https://github.com/projectchrono/chrono/blob/main/"
 
 _SCM_KEYS = {
@@ -228,54 +227,14 @@ _CHRONO_SCM = SoilTarget(
     },
     files={"scm_soil{}.json": _scm},
     loading="""\
-```
 import json
 soil = json.load(open("scm_soil.json"))["Soil Parameters"]
-terrain.SetSoilParameters(*soil.values())  # in the order of the file, before Initialize
-```
-""",
+terrain.SetSoilParameters(*soil.values())  # in the order of the file, before Initialize""",
     lost=(
         "SCM has no angle of maximum stress: pressure follows from the depth of each node.",
         "Its width b is that of the contact patch, not that of the wheel: with kc other than 0, "
         "the pressure at one depth differs.",
         "Below elastic_K times depth, pressure is elastic; damping_R acts on all vertical motion.",
-    ),
-)  # fmt: skip
-
-_CHRONO_CRM = SoilTarget(
-    name="chrono-crm",
-    program="Project Chrono, continuum terrain CRM (`ChFsiFluidSystemSPH::SoilProperties`)",
-    sources=(
-        f"{_CHRONO}src/chrono_fsi/sph/ChFsiFluidSystemSPH.h",
-        "https://api.projectchrono.org/manual_fsi_mu_i_rheology.html",
-    ),
-    mapped=(
-        MappedParameter(
-            "density", "kg/m^3", "unit_weight / 9.80665 m/s^2", ("unit_weight",),
-            lambda v: v["unit_weight"] / 9.80665,
-        ),
-        _angle("mu_fric_s", *_TAN),
-        _angle("mu_fric_2", *_TAN),
-        _same("cohesion_coeff", "Pa", "cohesion", "cohesion, of tau_max = mu p + c"),
-    ),
-    asked=(
-        AskedParameter("Young_modulus", "Pa", 1e6, "not measured; the default of Chrono"),
-        AskedParameter("Poisson_ratio", "1", 0.3, "not measured; the default of Chrono"),
-        AskedParameter("mu_I0", "1", 0.03, "without effect while mu_fric_2 is mu_fric_s"),
-        AskedParameter("average_diam", "m", 0.005, "not measured; the default of Chrono"),
-    ),
-    ignored=dict.fromkeys(("kc", "kphi", "n"), _NO_BEARING) | {
-        "shear_modulus": "CRM shears by its Young's modulus, not by a displacement K",
-        **dict.fromkeys(("a0", "a1"), _STRESS_ANGLE),
-    },
-    files={"crm_soil{}.json": lambda values: json_text(dict(values))},
-    loading="""\
-Set the fields of these names of `SoilProperties` (`ElasticMaterialProperties` in earlier versions),
-and leave the rheology at `MU_OF_I`.
-""",
-    lost=(
-        "What was measured of bearing (kc, kphi, n) and of K is lost: check sinkage and pull "
-        "of one wheel in CRM against your rows.",
     ),
 )  # fmt: skip
 
@@ -304,11 +263,9 @@ _GAZEBO = SoilTarget(
     files={"soil_params{}.yaml": _GAZEBO_PLUGIN, "surface{}.sdf": _SDF_SURFACE},
     loading="""\
 Take one of the two, not both: the plugin expects wheels without friction of their own.
-
-- `soil_params.yaml`: copy it into the folder `config_path` of the plugin gz-terramechanics, and
-  name the soil in `terrain_mapping.yaml`: `default_soil: soilml`.
-- `surface.sdf`: without the plugin, put `<surface>` into `<collision>` of the ground.
-""",
+soil_params.yaml: copy it into the folder config_path of the plugin gz-terramechanics, and
+name the soil in terrain_mapping.yaml: default_soil: soilml.
+surface.sdf: without the plugin, put <surface> into <collision> of the ground.""",
     lost=(
         "The plugin's stress is largest at theta_1 / 2, that of the fit at (a0 + a1 s) theta_1.",
         "surface.sdf is Coulomb friction on rigid ground: no sinkage, no cohesion, no bearing, no "
@@ -334,16 +291,11 @@ _ISAAC = SoilTarget(
     ),
     files={"soil_material{}.usda": _USD_MATERIAL},
     loading="""\
-Reference `soil_material.usda` in the stage and bind `/Soil` to the ground as physics material.
+Reference soil_material.usda in the stage and bind /Soil to the ground as physics material.
 Give the wheels a friction of 1: the combine mode is multiply, so that the pair has the soil's.
 PhysX takes the later of two modes in the order average, min, multiply, max.
-
-```
-sim_utils.RigidBodyMaterialCfg(
-    static_friction=..., dynamic_friction=..., friction_combine_mode="multiply"
-)
-```
-""",
+In Isaac Lab: sim_utils.RigidBodyMaterialCfg(
+    static_friction=..., dynamic_friction=..., friction_combine_mode="multiply")""",
     lost=(
         "Only tan(friction_angle) is kept. Sinkage, its resistance, cohesion, and the growth of "
         "shear stress with slip are lost.",
@@ -363,11 +315,11 @@ _CSV = SoilTarget(
     asked=(),
     ignored={},
     files={"soil{}.csv": _csv},
-    loading="Rows are parameters, in SI units; angles are in radians.\n",
+    loading="Rows are parameters, in SI units; angles are in radians.",
     lost=(),
 )
 
 #: Every target by the name that `--to` takes.
 TARGETS: dict[str, SoilTarget] = {
-    target.name: target for target in (_CHRONO_SCM, _CHRONO_CRM, _GAZEBO, _ISAAC, _CSV)
+    target.name: target for target in (_CHRONO_SCM, _GAZEBO, _ISAAC, _CSV)
 }

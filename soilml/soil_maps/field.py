@@ -11,8 +11,8 @@ from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
 from soilml.soil_maps.local_soils import LocalSoils, soil_values
 from soilml.traction.draws import SoilDraws
-from soilml.traction.rover_performance import on_slopes
 from soilml.traction.soil_draws import mixed_prior_draws
+from soilml.traction.vehicle import DrivenVehicle, on_slopes
 
 #: Shares of the variance of a patch that is local, correlation lengths of this part over the
 #: largest distance between stretches, shares of the rest that all patches have in common, and
@@ -247,7 +247,8 @@ def map_ability(
         effects = [i for i, path in enumerate(mixed.names) if "." in path]
         names += [mixed.names[i] for i in effects]
         values = np.concatenate([values, mixed.values[:, effects]], axis=1)
-    _, found = on_slopes(case, SoilDraws(tuple(names), values), slope, SLIP_LIMIT * SLIPS)
+    drawn, slips = SoilDraws(tuple(names), values), SLIP_LIMIT * SLIPS
+    found = on_slopes(DrivenVehicle.of_rover(case), drawn, slope, slips)
     climbs = found["margin"] >= 0.0
     outcomes = [climbs * 1.0, *(np.where(climbs, np.nan_to_num(found[name]), 0.0)
                                 for name in ("slip", "energy"))]  # fmt: skip

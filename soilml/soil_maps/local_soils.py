@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,13 +17,14 @@ from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.read_table import Rows, as_table, check_table
 from soilml.io.table import Table
+from soilml.numerics.importance_sampling import importance_sample
+from soilml.numerics.maximum_entropy import moment_matched_weights
 from soilml.numerics.prior import Prior
 from soilml.onboard.estimate import Estimate, Reason
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import COMMON_ERROR_INPUTS
 from soilml.onboard.tracking import Event, SoilTracker
 from soilml.quantities import CHANNELS, column
-from soilml.traction.soil_draws import estimated_draws
 
 ROWS, LEAST_ROWS = 8, 4  # Rows of one wheel in a stretch, and the fewest that are estimated
 MOST_STRETCHES = 120  # Of all wheels; rows are more where a drive is longer
@@ -161,15 +162,32 @@ def coordinates(estimator: Estimator) -> list[Coordinate]:
     return [Coordinate(n, u, Prior(float(low), float(high))) for n, u, low, high in names]
 
 
-def moments(estimate: Estimate, free: list[Coordinate]) -> tuple[Floats, Floats]:
-    """Mean (p,) and covariance (p, p) of the normal scores of an estimate."""
+def moments(estimate: Estimate, free: Sequence[Coordinate]) -> tuple[Floats, Floats]:
+    r"""Mean (p,) and covariance (p, p) of the normal scores of an estimate.
+
+    Those of the maximum-entropy density in the prior with the moments of the estimate,
+
+    .. math:: p(u) \propto \exp(\lambda^\top u + u^\top \Lambda u), \quad u \in [0, 1]^p
+
+    which is a Gaussian where the estimate is narrow, and the prior where it is as wide.
+
+    References: Jaynes, Phys. Rev. 106, 1957.
+    """
     from scipy.special import ndtri
 
-    draws = estimated_draws(free, estimate.mean, estimate.covariance).values
     low = np.asarray([f.prior.lower for f in free])
     width = np.asarray([f.prior.upper for f in free]) - low
-    score = ndtri(np.clip((draws - low) / width, END, 1.0 - END))
-    return score.mean(axis=0), np.cov(score.T)
+    middle = (estimate.mean - low) / width
+    factor = np.linalg.cholesky(estimate.covariance / np.outer(width, width))
+
+    def white(u: Floats) -> Floats:
+        return np.asarray(np.linalg.solve(factor, (u - middle).T).T)
+
+    found = importance_sample(lambda u: -0.5 * (white(u) ** 2).sum(axis=1), len(free))
+    weights = moment_matched_weights(found.weights, white(found.u))
+    score = ndtri(np.clip(found.u, END, 1.0 - END))
+    mean = weights @ score
+    return mean, ((score - mean).T * weights) @ (score - mean)
 
 
 def soil_values(free: tuple[Coordinate, ...], score: Floats) -> Floats:

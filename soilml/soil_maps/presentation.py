@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.quantities import QUANTITIES
-from soilml.report.figure_style import take_axes
 from soilml.report.numbers import format_log_density, pretty, shown_column
 from soilml.report.page import json_text
 from soilml.report.report import Picture, Report
@@ -20,10 +18,8 @@ from soilml.report.tables import Column, ReportTable
 from soilml.soil_maps.raster import geotiff, nav2_files
 from soilml.soil_maps.workflow import SoilMap, parameter_moments
 
-#: Rows and columns of panels, and width and height in inches, of maps of which ways: a map that is
-#: higher than wide by this factor has its panels beside each other.
-WIDE, TALL, TALL_FROM = (2, 2, (11.0, 8.5)), (1, 4, (14.0, 5.5)), 1.3
-FILES = ("map.tif", "headings.tif", "costmap.yaml", "costmap.pgm", "map.json", "map.png")
+SIZE = (11.0, 8.5)  # Width and height of the four panels, inches
+FILES = ("map.tif", "costmap.yaml", "costmap.pgm", "map.json", "map.png")
 
 
 def report_of_map(found: SoilMap, title: str = "Map of the soil") -> Report:
@@ -45,7 +41,6 @@ def report_of_map(found: SoilMap, title: str = "Map of the soil") -> Report:
             for name in ("tracker", "one soil")
         ]
         lines.append(f"Log density of the torque of rows held out: {', '.join(gains)}.")
-    rows, columns, size = map_panels(found)
     wheels = len(np.unique(drive.wheel))
     return Report(
         kind="map",
@@ -54,8 +49,8 @@ def report_of_map(found: SoilMap, title: str = "Map of the soil") -> Report:
         tables=[_patches(found), *([_slopes(found)] if found.ability is not None else [])],
         pictures=[
             Picture(
-                "Map", partial(plot_map, found), rows, columns, size, verdict,
-                "White: the path. Crosses: changes of the soil.", whole=columns > 2,
+                "Map", partial(_draw_map, found), 2, 2, SIZE, verdict,
+                "White: the path. Crosses: changes of the soil.",
             )
         ],
         remarks=list(found.remarks()),
@@ -137,8 +132,6 @@ def map_files(
 ) -> dict[Path, Any]:
     """Content of each file of the folder of a map; `draw` makes the picture."""
     binary = {"map.tif": geotiff(found.grid, found.bands(), epsg)}
-    if headings := found.heading_bands():
-        binary["headings.tif"] = geotiff(found.grid, headings, epsg)
     if (occupied := found.occupied) is not None:
         binary |= nav2_files(found.grid, found.grid.spread(occupied, found.known), "costmap")
     files: dict[str, Any] = {
@@ -149,18 +142,11 @@ def map_files(
     return {folder / name: content for name, content in files.items()}
 
 
-def map_panels(found: SoilMap) -> tuple[int, int, tuple[float, float]]:
-    """Rows and columns of the panels of `plot_map`, and the size of the figure in inches."""
-    height, width = found.grid.shape
-    return TALL if height > TALL_FROM * width else WIDE
-
-
-def plot_map(found: SoilMap, ax: Any = None) -> NDArray[Any]:
+def _draw_map(found: SoilMap, axes: Any) -> None:
     """Draw friction angle and its uncertainty, the probability of climbing and the slip needed.
 
-    Without a rover, cohesion and its uncertainty are in the place of the last two. See `take_axes`.
+    Without a rover, cohesion and its uncertainty are in the place of the last two.
     """
-    panels = take_axes(ax, *map_panels(found))
     mean, std = found.moments
     shown: list[tuple[str, Floats, tuple[float | None, float | None]]] = []
     for i in (1, 0)[: 1 if found.ability is not None else 2]:
@@ -169,15 +155,12 @@ def plot_map(found: SoilMap, ax: Any = None) -> NDArray[Any]:
         shown.append(("its standard deviation", factor * std[:, i], (None, None)))
     if found.ability is not None and (occupied := found.occupied) is not None:
         which = f"{np.rad2deg(found.ability.slope[-1]):g} deg"
-        slip = found.ability.slip[:, -1]
-        if found.by_heading is not None:
-            which, slip = "the steepest heading", _largest(found.by_heading.slip)
         shown.append((f"probability of climbing {which}", 1.0 - occupied, (0.0, 1.0)))
-        shown.append((f"slip needed for {which}", slip, (0.0, None)))
+        shown.append((f"slip needed for {which}", found.ability.slip[:, -1], (0.0, None)))
     grid = found.grid
     extent = (grid.west, grid.west + grid.cell * grid.shape[1],
               grid.south, grid.south + grid.cell * grid.shape[0])  # fmt: skip
-    for panel, (title, values, ends) in zip(panels.ravel(), shown, strict=True):
+    for panel, (title, values, ends) in zip(np.ravel(axes), shown, strict=True):
         image = panel.imshow(
             grid.spread(values, found.known), origin="lower", extent=extent, cmap="viridis",
             vmin=ends[0], vmax=ends[1], interpolation="nearest",
@@ -191,10 +174,3 @@ def plot_map(found: SoilMap, ax: Any = None) -> NDArray[Any]:
         panel.set_title(title)
         panel.set_xlabel("x, m")
         panel.set_ylabel("y, m")
-    return panels
-
-
-def _largest(values: Floats) -> Floats:
-    """The largest number of each row; NaN where there is none."""
-    known = np.isfinite(values)
-    return np.where(known.any(axis=1), np.where(known, values, -np.inf).max(axis=1), np.nan)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
 
@@ -14,7 +12,6 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
-from soilml.io.bounds import LOG_VALUES
 from soilml.optional_imports import need
 
 MOST_CELLS = 4_000_000
@@ -123,66 +120,3 @@ def nav2_files(grid: MapGrid, occupied: Floats, name: str) -> dict[str, bytes]:
         "occupied_thresh: 0.65\nfree_thresh: 0.25\n"
     )
     return {f"{name}.yaml": yaml.encode(), f"{name}.pgm": head + pixel[::-1].tobytes()}
-
-
-@dataclass(frozen=True)
-class Elevation:
-    """Heights (rows, columns), m, of points whose first is the north-west one."""
-
-    west: float  # x of the first point, m
-    north: float  # y of the first point, m
-    cell: float  # Distance of points, m
-    height: Floats
-    source: str
-
-    def at(self, place: Floats) -> Floats:
-        """Heights (...) at places (..., 2), between points; NaN outside and beside unknown ones."""
-        rows, columns = self.height.shape
-        across = (place[..., 0] - self.west) / self.cell
-        down = (self.north - place[..., 1]) / self.cell
-        inside = (across >= 0) & (across <= columns - 1) & (down >= 0) & (down <= rows - 1)
-        j = np.clip(across, 0, columns - 2).astype(np.int64)
-        i = np.clip(down, 0, rows - 2).astype(np.int64)
-        a, b = across - j, down - i
-        h = self.height
-        upper = (1 - a) * h[i, j] + a * h[i, j + 1]
-        lower = (1 - a) * h[i + 1, j] + a * h[i + 1, j + 1]
-        return np.where(inside, (1 - b) * upper + b * lower, np.nan)
-
-
-def read_elevation(path: str) -> Elevation:
-    """The first band of a GeoTIFF with square cells along the axes, in m.
-
-    Raises `InputError` for a file that is none.
-    """
-    need("tifffile", "map --elevation", "map")
-    import tifffile
-
-    try:
-        with tifffile.TiffFile(Path(path)) as file:
-            page: Any = file.pages[0]
-            LOG_VALUES.check(path, math.prod(page.shape))
-            height = np.asarray(page.asarray(), dtype=np.float64)
-            tags = {code: page.tags[code].value for code in (_SCALE, _TIEPOINT, _NODATA, _KEYS)
-                    if code in page.tags}  # fmt: skip
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file") from None
-    except InputError:
-        raise
-    except Exception as error:  # of whatever a damaged file raises
-        first = " ".join(str(error).split())
-        raise InputError(f"{path} cannot be read as GeoTIFF: {first}") from None
-    if height.ndim != 2 or min(height.shape) < 2 or not {_SCALE, _TIEPOINT} <= tags.keys():
-        raise InputError(
-            f"{path}: needed is a GeoTIFF of one band with ModelPixelScale and ModelTiepoint"
-        )
-    size, tie = tags[_SCALE], tags[_TIEPOINT]
-    if not np.isclose(size[0], size[1]) or len(tie) != 6:
-        raise InputError(f"{path}: needed are square cells along the axes, with one tie point")
-    if _NODATA in tags:
-        height[height == float(str(tags[_NODATA]).strip("\0 "))] = np.nan
-    keys = np.reshape(tags.get(_KEYS, ()), (-1, 4))[1:]
-    half = 0.0 if [_RASTER_TYPE, 2] in keys[:, [0, 3]].tolist() else 0.5  # point or middle of area
-    west = tie[3] + (half - tie[0]) * size[0]
-    north = tie[4] - (half - tie[1]) * size[0]
-    return Elevation(float(west), float(north), float(size[0]), height, path)

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.config.case import Case
 from soilml.config.given_case import GivenCase, as_case
 from soilml.errors import InputError
 from soilml.identification.trained_estimator import estimators_for_case
@@ -32,8 +31,8 @@ from soilml.soil_maps.local_soils import (
     soil_values,
     with_exact_sensors,
 )
-from soilml.soil_maps.raster import Elevation, MapGrid
-from soilml.traction.rover_performance import rover_for
+from soilml.soil_maps.raster import MapGrid
+from soilml.traction.vehicle import DrivenVehicle
 
 if TYPE_CHECKING:
     from soilml.report.report import Report
@@ -42,8 +41,6 @@ MODEL = "any_wheel"  # Released file that is taken where none is named
 CELL, REACH = 0.5, 2.0  # m
 SIZES = 0.01, 1000.0  # Least and greatest of both, m: a print of a wheel, and a day's drive
 SLOPES = np.deg2rad([0.0, 5.0, 10.0, 15.0])
-HEADINGS = ("E", "NE", "N", "NW", "W", "SW", "S", "SE")
-STEPS = 8  # Slopes between which those of a terrain are interpolated
 NORMALS = 256  # Normal quantiles from which mean and spread of a parameter are computed
 Progress = Callable[[str, int, int], None]
 
@@ -58,8 +55,6 @@ class SoilMap(Result):
     score, covariance: Normal scores of the soil in the k cells that are known, (k, p) and (k, p,
         p).
     ability: The rover straight up slopes; None for a model file without [rover].
-    pitch: Of each heading of `HEADINGS` in these cells, rad (k, 8); None without elevation.
-    by_heading: The rover along each heading, whose slopes are those of `pitch`, arrays (k, 8).
     held_out: How well stretches are predicted that were left out; None for a short drive.
     notes: Remarks on model file and trained file.
     """
@@ -73,8 +68,6 @@ class SoilMap(Result):
     score: Floats
     covariance: Floats
     ability: MapAbility | None
-    pitch: Floats | None
-    by_heading: MapAbility | None
     held_out: HeldOutScore | None
     notes: tuple[Remark, ...] = ()
 
@@ -85,9 +78,7 @@ class SoilMap(Result):
 
     @property
     def occupied(self) -> Floats | None:
-        """Probability (k,) of not climbing: the steepest slope asked for, or the worst heading."""
-        if self.by_heading is not None:
-            return np.asarray(1.0 - self.by_heading.climbed.min(axis=1))
+        """Probability (k,) of not climbing the steepest slope asked for."""
         return None if self.ability is None else 1.0 - self.ability.climbed[:, -1]
 
     @property
@@ -99,24 +90,22 @@ class SoilMap(Result):
 
     def bands(self) -> dict[str, Floats]:
         """Grids of the parameters with their standard deviations, and of the rover's slopes."""
+        found = self._soil_columns()
+        if (own := self.ability) is not None:
+            for j, slope in enumerate(np.rad2deg(own.slope)):
+                found[f"climbs_{slope:g}_deg"] = own.climbed[:, j]
+                found[f"slip_{slope:g}_deg"] = own.slip[:, j]
+                found[f"energy_{slope:g}_deg_J_m"] = own.energy[:, j]
+        return {name: self.grid.spread(values, self.known) for name, values in found.items()}
+
+    def _soil_columns(self) -> dict[str, Floats]:
+        """Means and standard deviations (k,) by column."""
         found: dict[str, Floats] = {}
         mean, std = self.moments
         for i, coordinate in enumerate(self.soils.free):
             name = QUANTITIES[coordinate.path].column
             found |= {name: mean[:, i], f"{name}_std": std[:, i]}
-        if self.ability is not None:
-            for j, slope in enumerate(np.rad2deg(self.ability.slope)):
-                found |= _bands_of(self.ability, j, f"{slope:g}_deg")
-        return {name: self.grid.spread(values, self.known) for name, values in found.items()}
-
-    def heading_bands(self) -> dict[str, Floats]:
-        """Grids by heading: pitch, probability of climbing, slip and energy; none without one."""
-        if self.by_heading is None or self.pitch is None:
-            return {}
-        found: dict[str, Floats] = {}
-        for j, name in enumerate(HEADINGS):
-            found |= {f"pitch_{name}_rad": self.pitch[:, j]} | _bands_of(self.by_heading, j, name)
-        return {name: self.grid.spread(values, self.known) for name, values in found.items()}
+        return found
 
     def report(self) -> Report:
         """Where the soil changes, the soil of each patch, slopes, and how well it predicts."""
@@ -129,11 +118,7 @@ class SoilMap(Result):
         centres = self.grid.centres[self.known]
         columns: dict[str, Any] = {"cell": np.flatnonzero(self.known)}
         columns |= {"x_m": centres[:, 0], "y_m": centres[:, 1]}
-        mean, std = self.moments
-        for i, coordinate in enumerate(self.soils.free):
-            name = QUANTITIES[coordinate.path].column
-            columns |= {name: mean[:, i], f"{name}_std": std[:, i]}
-        return columns
+        return columns | self._soil_columns()
 
     def remarks(self) -> Iterator[Remark]:
         """What to know of the map, by code."""
@@ -153,9 +138,6 @@ class SoilMap(Result):
             yield Remark("not-determined", text, tuple(vague))
         if self.ability is None:
             yield Remark("no-rover", "the model file has no [rover]: soil alone, no slopes")
-        if self.pitch is not None:
-            text = "side slopes are not considered, and downhill counts as level"
-            yield Remark("no-side-slope", text, severity="note")
         if self.held_out is None:
             text = "too few stretches to hold some out: how well it predicts is not known"
             yield Remark("no-score", text)
@@ -175,7 +157,6 @@ def soil_map(
     cell: float = CELL,
     reach: float = REACH,
     slopes: Floats | Sequence[float] = SLOPES,
-    elevation: Elevation | None = None,
     score: bool = True,
     progress: Progress | None = None,
 ) -> SoilMap:
@@ -194,8 +175,6 @@ def soil_map(
         Side of a cell, and how far from a reading the soil is said to be known, m.
     slopes
         Rising slopes that the rover is to climb, rad.
-    elevation
-        Heights of the terrain, for the slope along each heading.
     score
         Whether stretches are held out to see how well the map predicts them.
     progress
@@ -210,7 +189,7 @@ def soil_map(
     ------
     InputError
         For a gear or effect that the file is not for, several gears, a cell or reach beyond
-        `SIZES` or without a known cell, and as `rover_performance` does.
+        `SIZES` or without a known cell, and as `DrivenVehicle.check_slopes` does.
     TableError, FitError
         As `read_map_drive`, `follow` and `local_soils` do.
     """
@@ -223,7 +202,7 @@ def soil_map(
         raise InputError("the model file has several gears; a map is of the wheels of one: --gear")
     asked = np.asarray(slopes, dtype=np.float64)
     if case.rover is not None:
-        rover_for(case, asked)
+        DrivenVehicle.of_rover(case).check_slopes(asked)
     own = Estimator.load(MODEL) if estimator is None else estimator
     if own.sets is None:
         raise InputError(f"{own.path} has no set posterior; train it with [set_posterior]")
@@ -249,23 +228,28 @@ def soil_map(
             f"no cell of {cell:g} m has its middle within {reach:g} m of a reading; give smaller "
             "ones with --cell, or a longer --reach"
         )
-    centres = grid.centres[known]
-    mean, covariance = field.at(centres)
-    ability = pitch = by_heading = None
+    mean, covariance = field.at(grid.centres[known])
+    ability = None
     if case.rover is not None:
         ability = map_ability(case, soils, mean, covariance, asked)
-        if elevation is not None:
-            pitch = _pitches(case, elevation, centres)
-            by_heading = _along(case, soils, mean, covariance, pitch)
     held_out = None
     if score:
         tell("predicting stretches held out", 0, 1)
         held_out = held_out_score(alone, with_exact_sensors(own), drive, followed, soils)
         tell("predicting stretches held out", 1, 1)
     return SoilMap(
-        drive, followed, soils, field, grid, known, mean, covariance, ability, pitch, by_heading,
-        held_out, tuple(notes),
-    )  # fmt: skip
+        drive,
+        followed,
+        soils,
+        field,
+        grid,
+        known,
+        mean,
+        covariance,
+        ability,
+        held_out,
+        tuple(notes),
+    )
 
 
 def parameter_moments(
@@ -280,53 +264,9 @@ def parameter_moments(
     return values.mean(axis=0), values.std(axis=0)
 
 
-def _bands_of(ability: MapAbility, j: int, name: str) -> dict[str, Floats]:
-    return {
-        f"climbs_{name}": ability.climbed[:, j],
-        f"slip_{name}": ability.slip[:, j],
-        f"energy_{name}_J_m": ability.energy[:, j],
-    }
-
-
 def _within(grid: MapGrid, place: Floats, reach: float) -> NDArray[np.bool_]:
     """Cells whose middle is within reach of a place."""
     from scipy.spatial import cKDTree
 
     distance, _ = cKDTree(place).query(grid.centres, distance_upper_bound=reach)
     return np.asarray(np.isfinite(distance))
-
-
-def _pitches(case: Case, elevation: Elevation, centres: Floats) -> Floats:
-    """Slope of the terrain along each heading, over the length of the rover, rad (k, 8)."""
-    assert case.rover is not None
-    forward = [wheel.forward for wheel in case.rover.wheels.values()]
-    half = max(0.5 * (max(forward) - min(forward)), 0.5 * elevation.cell)
-    angle = 2.0 * np.pi * np.arange(len(HEADINGS)) / len(HEADINGS)
-    step = half * np.column_stack([np.cos(angle), np.sin(angle)])
-    rise = elevation.at(centres[:, None] + step) - elevation.at(centres[:, None] - step)
-    pitch = np.arctan2(rise, 2.0 * half)
-    if not np.isfinite(pitch).any():
-        raise InputError(
-            f"{elevation.source} does not cover the drive: check the coordinates of both"
-        )
-    return pitch
-
-
-def _along(
-    case: Case, soils: LocalSoils, mean: Floats, covariance: Floats, pitch: Floats
-) -> MapAbility:
-    """The rover along each heading, interpolated between slopes; NaN without elevation."""
-    assert case.rover is not None
-    highest = min(float(np.nanmax(pitch)), 0.98 * case.rover.tipping_slope(np.deg2rad(60.0)))
-    slopes = np.linspace(0.0, max(highest, np.deg2rad(1.0)), STEPS)
-    found = map_ability(case, soils, mean, covariance, slopes)
-    place = np.clip(pitch / slopes[-1], 0.0, 1.0) * (STEPS - 1)
-    left = np.minimum(np.nan_to_num(place), STEPS - 2).astype(np.int64)
-    share, row = place - left, np.arange(len(pitch))[:, None]
-
-    def between(values: Any) -> Floats:
-        low, high = values[row, left], values[row, left + 1]
-        return np.asarray(np.where(share > 0.0, low + share * (high - low), low) + 0.0 * pitch)
-
-    climbed = np.where(pitch > slopes[-1], 0.0, between(found.climbed))
-    return MapAbility(pitch, climbed, between(found.slip), between(found.energy))

@@ -4,28 +4,23 @@ from __future__ import annotations
 
 from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.traction.draws import SoilDraws
-from soilml.traction.pull_and_slope import (
-    LoadPrediction,
-    Traction,
-    predict_traction,
-    predictions_by_load,
-)
-from soilml.traction.report import PullReport, pull_report
-from soilml.traction.soil_draws import estimated_draws, posterior_draws, prior_draws
+from soilml.traction.prediction import TractionPrediction
+from soilml.traction.report import PullReport
+from soilml.traction.soil_draws import prior_draws
+from soilml.traction.vehicle import DrivenVehicle, Performance, performance
+from soilml.traction.workflow import pull_report
 
 #: The name under which `soilml` has it
 pull = pull_report
 
 __all__ = [
-    "LoadPrediction",
+    "DrivenVehicle",
+    "Performance",
     "PullReport",
     "QuantileBand",
     "SoilDraws",
-    "Traction",
-    "estimated_draws",
-    "posterior_draws",
-    "predict_traction",
-    "predictions_by_load",
+    "TractionPrediction",
+    "performance",
     "prior_draws",
     "pull",
     "pull_report",

@@ -1,245 +1,190 @@
-"""Pull and slope of one gear from a case and a table of rows: prediction, columns, report."""
+"""The report of pull and slopes of a wheel or a rover: tables, pictures and what limits them."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.config.given_case import GivenCase, as_case
-from soilml.fitting.operating_points import operating_points
-from soilml.io.read_table import Rows, as_table
 from soilml.numerics.quantiles import band_columns, quantile_band
-from soilml.onboard.estimator import Estimator
-from soilml.physics.operating_point import COVARIATES
-from soilml.physics.pull_efficiency import traffic_class
-from soilml.physics.soils.gravity_law import GravityChange
-from soilml.quantities import NOT_IDENTIFIED_ABOVE, column
+from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.remarks import Remark
 from soilml.report.column_figure import column_picture
 from soilml.report.numbers import format_quantity, format_range, significant
 from soilml.report.report import Picture, Report
 from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
-from soilml.traction.gravity import gravity_remark
 from soilml.traction.measured_range import (
     SAME_LOAD,
     MeasuredRange,
-    band_content,
-    measured_loads,
-    slip_grid,
 )
-from soilml.traction.pull_and_slope import (
-    LoadPrediction,
-    Traction,
-    excluded_effects,
-    predictions_by_load,
+from soilml.traction.prediction import (
+    FEWEST,
+    TractionPrediction,
 )
-from soilml.traction.soil_draws import measured_soil
 
 STEP = 2  # Tables show every second slip
-#: Loads down to this share of the smallest are in the range of the errors: those on a slope.
-ON_SLOPES = 0.5
-NOT_INCLUDED = "all wheels equal, no load transfer, no side slope"  # What no band includes
 _NOTATION = (
     ("90 %", "from the 5 % to the 95 % quantile; medians before them."),
-    ("tractive efficiency", "power at the drawbar over that of the drive."),
-    ("pull efficiency", "share of the thrust that is left as pull; class by 35, 50, 65 %."),
+    ("climbed", "share of the soils, which the rows allow, on which the slope is climbed."),
+    ("margin", "largest pull less the weight along the slope."),
+    ("efficiency", "power at the drawbar over that of the drives, on level ground."),
 )
 
 
 @dataclass(frozen=True, repr=False)
 class PullReport(Result):
-    """Predictions under each load.
+    """Predictions of a rover, or of a wheel under each load.
 
     rows: Number of rows.
     measured_range: Slips and loads of the rows.
-    by_load: Prediction under each load.
+    by_load: Prediction under each load; one for a rover.
     measured_pull: Slip, load (N) and drawbar pull (N) of the k rows that measured it, (k,) each.
-    warnings: Those that hold for all loads.
+    warnings: Those that hold for all.
+    of_rover: Whether they are of a rover.
     """
 
     rows: int
     measured_range: MeasuredRange
-    by_load: list[LoadPrediction]
+    by_load: list[TractionPrediction]
     measured_pull: tuple[Floats, Floats, Floats]
     warnings: tuple[Remark, ...]
+    of_rover: bool = False
 
     @property
     def vague(self) -> list[bool]:
-        """Whether largest pull and steepest slope of each load are no better known than before."""
+        """Whether largest pull and steepest slope of each are no better known than before."""
         return [
             share > NOT_IDENTIFIED_ABOVE for o in self.by_load for share in o.remaining_fraction
         ]
 
     def frame_columns(self) -> dict[str, Any]:
-        """A row for each load and slip: medians and 90 % bands, what belongs to a load in all."""
-        parts = [_columns(one) for one in self.by_load]
-        return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+        """Medians and ends of 90 % bands, SI units: a row for each load and slip, or each slope."""
+        if self.of_rover:
+            return _slope_columns(self.by_load[0])
+        return _of_loads(self.by_load, _curve_columns)
 
-    def report(self, title: str = "Drawbar pull and slope") -> Report:
-        """Largest pull and steepest slope under each load, their curves, and what limits them."""
-        loads, columns = self.by_load, self.frame_columns()
-        kept = [np.arange(len(one.posterior.slip)) % STEP == STEP - 1 for one in loads]
-        shown = np.flatnonzero(np.concatenate(kept))
-        tables = [_table_of_loads(loads)]
-        heads = {"Pull and slope": r"drawbar_pull_N|slope_rad"}
-        if any(one.posterior.most_efficient is not None for one in loads):
-            heads["Efficiency"] = r"tractive_efficiency|pull_efficiency|traffic_class\w*"
-        for head, names in heads.items():
-            of = re.compile(rf"(load_N|slip|{names})(_p05|_p95)?")
-            own = {n: np.asarray(v)[shown] for n, v in columns.items() if of.fullmatch(n)}
-            tables.append(ReportTable.of(head, own))
-        tables += [one.laws.table() for one in loads if one.laws is not None]
-        sentences = [_sentence(one) for one in loads]
+    def report(self, title: str = "Drawbar pull and slopes") -> Report:
+        """Largest pull and steepest slope, curves and slopes, and what limits them."""
+        vague, still = self.vague, self.by_load[0].posterior.still_fraction
         under: dict[Remark, list[str]] = {}
-        for one in loads:
+        for one in self.by_load:
             for remark in one.warnings:
-                under.setdefault(remark, []).append(significant(one.posterior.load))
-        remarks = [remark.under(f"{', '.join(names)} N: ") for remark, names in under.items()]
-        vague = self.vague
+                under.setdefault(remark, []).append(significant(one.vehicle.weight))
+        heads = {r: "" if self.of_rover else f"{', '.join(n)} N: " for r, n in under.items()}
+        sentences = [_sentence(one, self.of_rover) for one in self.by_load]
         slips = format_range(*self.measured_range.slip, digits=2)
+        loads = format_range(*self.measured_range.load)
+        status, tone = "predicted", "good"
+        if all(vague) or any(vague):
+            status, tone = "not known" if all(vague) else "partly known", "warn"
+        if still > FEWEST:
+            status, tone = "does not move", "bad"
         return Report(
             kind="pull",
             verdict=sentences[0],
-            lines=[*sentences[1:], *(_efficiency(loads[0].posterior) if len(loads) == 1 else ())],
-            tables=tables,
-            pictures=[self._picture(columns)],
-            remarks=[*remarks, *self.warnings],
+            lines=[*sentences[1:], *(_lines(self.by_load[0]) if len(sentences) == 1 else ())],
+            tables=list(self._tables()),
+            pictures=self._pictures(),
+            remarks=[*(r.under(head) for r, head in heads.items()), *self.warnings],
             next_steps=[
                 "measure a row at another load and slip: soilml plan next finds the best one"
             ],
-            status="not known" if all(vague) else "partly known" if any(vague) else "predicted",
-            tone="warn" if any(vague) else "good",
+            status=status,
+            tone=tone,
             title=title,
-            basis=f"{self.rows} row{'s'[: self.rows != 1]} at slips {slips}",
+            basis=f"{self.rows} row{'s'[: self.rows != 1]} at slips {slips}, loads {loads} N",
             notation=_NOTATION,
         )
 
-    def _picture(self, columns: dict[str, Any]) -> Picture:
+    def _tables(self) -> Iterator[ReportTable]:
+        if self.of_rover:
+            yield _table_of_slopes(self.by_load[0])
+            yield from _table_of_wheels(self.by_load[0])
+            return
+        yield _table_of_loads(self.by_load)
+        columns = _of_loads(self.by_load, _curve_columns)
+        kept = [np.arange(len(one.posterior.curve_slip)) % STEP == STEP - 1 for one in self.by_load]
+        shown = np.flatnonzero(np.concatenate(kept))
+        known = ("load_N", "slip", "drawbar_pull_N", "tractive_efficiency", "sinkage_m")
+        own = {
+            name: np.asarray(values)[shown]
+            for name, values in columns.items()
+            if name.removesuffix("_p05").removesuffix("_p95") in known
+        }
+        yield ReportTable.of("Pull on level ground", own)
+        for one in self.by_load:
+            yield _table_of_slopes(one, f" under {significant(one.vehicle.weight)} N")
+
+    def _pictures(self) -> list[Picture]:
+        several = ("load_N",) if len(self.by_load) > 1 else ()
+        slopes = column_picture(
+            _hidden_where_not_climbed(self.by_load),
+            "slope_rad",
+            [("slip",), ("margin_N",), ("energy_J_per_m",), ("probability_climbed",)],
+            several,
+            title="On slopes",
+            caption="Lines: medians. Bands: 90 % of the soils that the rows allow.",
+        )
+        if self.of_rover:
+            return [slopes]
         slip, load, pull = self.measured_pull
-        if len(self.by_load) == 1:
-            near = np.abs(load / self.by_load[0].posterior.load - 1.0) < SAME_LOAD
+        columns = _of_loads(self.by_load, _curve_columns)
+        if not several:
+            near = np.abs(load / self.by_load[0].vehicle.weight - 1.0) < SAME_LOAD
             slip, pull = slip[near], pull[near]
         else:
             columns = {name: values for name, values in columns.items() if "_prior" not in name}
-        slips = format_range(*self.measured_range.slip, digits=2)
-        return column_picture(
+        driven = format_range(*self.measured_range.slip, digits=2)
+        curves = column_picture(
             columns,
             "slip",
-            [("drawbar_pull_N",), ("slope_rad",), ("tractive_efficiency", "pull_efficiency")],
-            ("load_N",) if len(self.by_load) > 1 else (),
-            title="Pull, slope and efficiency over slip",
+            [("drawbar_pull_N",), ("tractive_efficiency",), ("sinkage_m",)],
+            several,
+            title="Pull, efficiency and sinkage over slip",
             caption="Lines: medians. Bands: 90 % of the soils that the rows allow; grey: of the "
-            f"prior. Points: measured pull. Slips {slips} were measured.",
+            f"prior. Points: measured pull. Slips {driven} were measured.",
             measured={"slip": slip, "drawbar_pull_N": pull},
         )
+        return [curves, slopes]
 
 
-def pull_report(
-    case: GivenCase,
-    table: Rows,
-    *,
-    free: Sequence[str] | None = None,
-    loads: Sequence[float] | None = None,
-    slip_limit: float | None = None,
-    estimator: Estimator | None = None,
-    exact_model: bool = False,
-    gravity: GravityChange | None = None,
-) -> PullReport:
-    """Pull and slope of a gear on the soil that the rows were measured on.
-
-    Parameters
-    ----------
-    case
-        Model, soil, priors and noise, or the path of a model file.
-    table
-        Measured rows of one soil, as for `identify`. Speed, pass number and slip angle of the
-        prediction are their medians.
-    free
-        Paths of the unknown parameters; by default those with a prior.
-    loads
-        Vertical loads, N; by default those of the rows.
-    slip_limit
-        Highest slip, in (0, 1); by default the highest measured one, at least 0.6.
-    estimator
-        Trained estimator whose estimate replaces the posterior.
-    exact_model
-        Whether the soil is that of the model taken as exact, and not averaged over explanations as
-        in `identify`; not with an estimator.
-    gravity
-        Gravity of the rows and of the prediction, with a law of the soil; loads are those of the
-        prediction. By default both are the same.
-
-    Returns
-    -------
-    PullReport
-        Draws of pull (N) and slope (rad) under each load, for the posterior and the prior.
-
-    Raises
-    ------
-    InputError
-        For a load that the soil does not carry, a slip limit outside (0, 1), or an estimator for
-        another gear.
-    FitError, TableError
-        As `identify`.
-    """
-    case, table = as_case(case), as_table(table)
-    soil = measured_soil(case, table, free, estimator, exact_model)
-    case, warnings = soil.case, [*soil.warnings, *excluded_effects(soil.case)]
-    table = table.rows(table.answered)
-    at = operating_points(table)
-    measured_range = MeasuredRange.of(table["slip"], table["load_N"])
-    covariates = {
-        field: float(np.median(values))
-        for field in COVARIATES
-        if (values := getattr(at, field)) is not None
-    }
-    loads = measured_loads(table["load_N"]) if loads is None else loads
-    slip = slip_grid(slip_limit, measured_range)
-    asked = [*loads, ON_SLOPES * min(loads)]
-    draws, before = soil.with_errors(slip, asked, ("drawbar_pull",))
-    predictions = predictions_by_load(
-        case, draws, before, loads, slip, measured_range, covariates, gravity
-    )
-    if gravity is not None and gravity.ratio != 1.0:
-        warnings.append(gravity_remark(gravity))
-    key = column("drawbar_pull")
-    pull = table[key] if key in table else np.full(len(table), np.nan)
-    known = np.isfinite(pull)
-    measured_pull = table["slip"][known], table["load_N"][known], pull[known]
-    return PullReport(
-        len(table),
-        measured_range,
-        predictions,
-        measured_pull,
-        (*warnings, band_content(before.errors, NOT_INCLUDED)),
-    )
+def _of_loads(
+    loads: Sequence[TractionPrediction], columns: Callable[[TractionPrediction], dict[str, Any]]
+) -> dict[str, Any]:
+    """Columns of each load below each other."""
+    parts = []
+    for one in loads:
+        own = columns(one)
+        count = len(next(iter(own.values())))
+        parts.append({"load_N": np.full(count, one.vehicle.weight)} | own)
+    return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
 
 
-def _columns(one: LoadPrediction) -> dict[str, Any]:
+def _curve_columns(one: TractionPrediction) -> dict[str, Any]:
+    """A row for each slip on level ground; what belongs to the vehicle in all."""
     known, prior = one.posterior, one.prior
-    count = len(known.slip)
-    columns = {"load_N": np.full(count, known.load), "slip": known.slip}
+    count = len(known.curve_slip)
+    columns: dict[str, Any] = {"slip": known.curve_slip}
     for name, values in (
         ("drawbar_pull_N", known.pull),
-        ("slope_rad", known.slope),
+        ("tractive_efficiency", known.efficiency),
+        ("sinkage_m", known.deepest),
         ("largest_drawbar_pull_N", known.largest_pull),
-        ("best_slip", known.best_slip),
+        ("strongest_slip", known.strongest_slip),
         ("steepest_slope_rad", known.steepest_slope),
-        ("tractive_efficiency", known.tractive_efficiency),
-        ("pull_efficiency", known.pull_efficiency),
-        ("sinkage_m", known.sinkage),
     ):
         columns |= {k: np.broadcast_to(v, count) for k, v in band_columns(name, values).items()}
-    columns |= _classes(known)
-    before = quantile_band(prior.pull), quantile_band(prior.slope)
-    for name, found in zip(("drawbar_pull_N", "slope_rad"), before, strict=True):
-        columns[f"{name}_prior_p05"], columns[f"{name}_prior_p95"] = found.lower, found.upper
+    for name, values in (
+        ("drawbar_pull_N", prior.pull),
+        ("steepest_slope_rad", prior.steepest_slope),
+    ):
+        band = quantile_band(values)
+        columns[f"{name}_prior_p05"] = np.broadcast_to(band.lower, count)
+        columns[f"{name}_prior_p95"] = np.broadcast_to(band.upper, count)
     for name, share in zip(
         ("largest_drawbar_pull", "steepest_slope"), one.remaining_fraction, strict=True
     ):
@@ -247,56 +192,122 @@ def _columns(one: LoadPrediction) -> dict[str, Any]:
     return columns
 
 
-def _classes(known: Traction) -> dict[str, Any]:
-    """The traffic class of the median pull efficiency at each slip, and the soils that share it."""
-    middle = quantile_band(known.pull_efficiency).middle
-    usual, each = traffic_class(middle), traffic_class(known.pull_efficiency)
-    finite = np.isfinite(middle)
-    probability = np.where(finite, (each == usual).mean(axis=0), np.nan)
-    return {"traffic_class": np.where(finite, usual, ""), "traffic_class_probability": probability}
+def _slope_columns(one: TractionPrediction) -> dict[str, Any]:
+    """A row for each slope; of several wheels, also what each does."""
+    own = one.posterior
+    columns: dict[str, Any] = {"slope_rad": own.slope, "probability_climbed": own.climbed}
+    for name, draws in (
+        ("slip", own.slip),
+        ("margin_N", own.margin),
+        ("energy_J_per_m", own.energy),
+        ("steepest_slope_rad", own.steepest_slope[:, None] + 0.0 * own.slope),
+    ):
+        columns |= band_columns(name, draws)
+    for name in own.loads if len(own.loads) > 1 else ():
+        columns[f"load_N_{name}"] = own.loads[name]
+        columns[f"torque_Nm_{name}"] = quantile_band(own.torque[name]).middle
+        columns[f"sinkage_m_{name}"] = quantile_band(own.sinkage[name]).middle
+    return columns
 
 
-def _sentence(one: LoadPrediction) -> str:
-    """Largest pull and steepest slope under a load, with 90 % bands where the rows tell them."""
-    known = one.posterior
+def _hidden_where_not_climbed(loads: Sequence[TractionPrediction]) -> Mapping[str, Any]:
+    """The columns of slopes, with slip and work blank where hardly any soil lets it climb."""
+    columns = _of_loads(loads, _slope_columns)
+    enough = columns["probability_climbed"] >= FEWEST
+    shown = ("load_N", "slope", "prob", "margin")
+    return {
+        name: np.where(enough | name.startswith(shown), values, np.nan)
+        for name, values in columns.items()
+    }
+
+
+def _sentence(one: TractionPrediction, of_rover: bool) -> str:
+    """Largest pull and steepest slope, with 90 % bands where the rows tell them."""
+    own = one.posterior
+    who = "The rover" if of_rover else f"At {significant(one.vehicle.weight)} N the wheel"
+    if own.still_fraction > FEWEST:
+        share = format_quantity(own.still_fraction, "share", digits=2)
+        return f"{who} does not move: {share} of the soils do not let it."
     unknown = {"N": "an unknown force", "rad": "an unknown slope"}
-    said = [
+    pull, slope = (
         unknown[unit] if share > NOT_IDENTIFIED_ABOVE else quantile_band(draws).text(unit)
         for draws, unit, share in zip(
-            (known.largest_pull, known.steepest_slope), unknown, one.remaining_fraction, strict=True
+            (own.largest_pull, own.steepest_slope), unknown, one.remaining_fraction, strict=True
         )
-    ]
-    return f"At {significant(known.load)} N the wheel pulls {said[0]} at most and climbs {said[1]}."
-
-
-def _efficiency(known: Traction) -> Iterator[str]:
-    """Both efficiencies, and the class, where the drive is used best."""
-    i = known.most_efficient
-    if i is None:
-        return
-    tractive, pull = (
-        quantile_band(v[:, i]).text(digits=2)
-        for v in (known.tractive_efficiency, known.pull_efficiency)
     )
-    where = f"{known.slip[i]:.2g}"
-    yield f"Tractive efficiency is best at slip {where}: {tractive}; pull efficiency {pull}."
-    found = _classes(known)
-    share = format_quantity(float(found["traffic_class_probability"][i]), "share", digits=2)
-    yield f"Traffic class there: {found['traffic_class'][i]}, on {share} of the soils."
+    if of_rover:
+        return f"The rover climbs {slope} at slips up to {own.slip_limit:.2g}."
+    return f"{who} pulls {pull} at most and climbs {slope}."
 
 
-def _table_of_loads(loads: Sequence[LoadPrediction]) -> ReportTable:
+def _lines(one: TractionPrediction) -> Iterator[str]:
+    """Where the drives are used best, and what was known before the rows."""
+    own = one.posterior
+    if own.still_fraction > FEWEST:
+        return
+    if np.isfinite(own.best_slip).any():
+        best = quantile_band(own.best_efficiency).text(digits=2)
+        slip = quantile_band(own.best_slip).text()
+        yield f"The best slip on level ground is {slip}, with an efficiency of {best}."
+    if np.isfinite(one.prior.steepest_slope).any():
+        before = quantile_band(one.prior.steepest_slope).text("rad")
+        yield f"Before the rows, the steepest slope was {before}."
+    if own.still_fraction > 0.0:
+        share = format_quantity(own.still_fraction, "share", digits=2)
+        yield f"{share} of the soils do not let it move."
+
+
+def _table_of_loads(loads: Sequence[TractionPrediction]) -> ReportTable:
     known = [one.posterior for one in loads]
     pulls = [quantile_band(one.prior.largest_pull) for one in loads]
+    steepest = [quantile_band(k.steepest_slope) for k in known]
     return ReportTable(
         "By load",
         [
-            Column("load", [one.load for one in known], "N"),
+            Column("load", [one.weight for one in known], "N"),
             Column.of_bands("largest pull", [quantile_band(k.largest_pull) for k in known], "N"),
-            Column.of_bands(
-                "steepest slope", [quantile_band(k.steepest_slope) for k in known], "rad"
-            ),
-            Column.of_bands("at slip", [quantile_band(k.best_slip) for k in known], digits=2),
+            Column.of_bands("steepest slope", steepest, "rad"),
+            Column.of_bands("at slip", [quantile_band(k.strongest_slip) for k in known], digits=2),
             Column.of_bands("pull before the rows", pulls, "N"),
+        ],
+    )
+
+
+def _table_of_slopes(one: TractionPrediction, under: str = "") -> ReportTable:
+    own, enough = one.posterior, one.posterior.climbed >= FEWEST
+    blank = np.where(enough, 0.0, np.nan)
+    columns = [
+        Column("slope", own.slope.tolist(), "rad", digits=3),
+        Column("climbed", own.climbed.tolist(), "share", digits=3),
+    ]
+    for head, draws, unit, hidden in (
+        ("slip", own.slip, "1", blank),
+        ("margin", own.margin, "N", 0.0),
+        ("work", own.energy, "J/m", blank),
+    ):
+        band = quantile_band(draws)
+        ends = ((band.lower + hidden).tolist(), (band.upper + hidden).tolist())
+        columns.append(Column(head, (band.middle + hidden).tolist(), unit, ends=ends))
+    return ReportTable(f"Slopes{under}", columns)
+
+
+def _table_of_wheels(one: TractionPrediction) -> Iterator[ReportTable]:
+    """Loads, torques and sinkages on the steepest of the slopes that most draws climb."""
+    own = one.posterior
+    climbed = np.flatnonzero(own.climbed >= FEWEST)
+    if not climbed.size:
+        return
+    at = int(climbed[-1])
+    torque = [quantile_band(own.torque[name][:, at]) for name in own.loads]
+    sinkage = [quantile_band(own.sinkage[name][:, at]) for name in own.loads]
+    passes = [int(others["pass_number"]) for _, others in one.vehicle.wheels.values()]
+    yield ReportTable(
+        f"Wheels on {format_quantity(float(own.slope[at]), 'rad')}",
+        [
+            Column("wheel", list(own.loads)),
+            Column("pass", passes),
+            Column("load", [float(load[at]) for load in own.loads.values()], "N"),
+            Column.of_bands("torque", torque, "N m"),
+            Column.of_bands("sinkage", sinkage, "m"),
         ],
     )

@@ -34,9 +34,10 @@ epochs = 40
 
 @pytest.fixture
 def small_training(tmp_path, monkeypatch):
-    """Files are trained by the small spec, and calibrated on a tenth of the usual sets."""
+    """Files are trained by the small spec, and calibrated on a tenth of the sets of few sizes."""
     (tmp_path / "small.toml").write_text(SMALL_SPEC)
     monkeypatch.setattr(workflow, "SPEC", str(tmp_path / "small.toml"))
+    monkeypatch.setattr(validation, "SET_SIZES", (1, 4, 16))
     for name in ("LIMIT_SETS", "FIGURE_SETS", "LEAST_NEIGHBOURS"):
         monkeypatch.setattr(validation, name, getattr(validation, name) // 10)
 

@@ -23,7 +23,7 @@ def design(loads=(40, 60, 90, 140), slips=5, speeds=None):
 def audited(folder, text=None, model=MODEL, *options):
     (folder / "model.toml").write_text(model)
     (folder / "design.csv").write_text(text or design())
-    command = ["audit", str(folder / "model.toml"), str(folder / "design.csv")]
+    command = ["plan", "effects", str(folder / "model.toml"), str(folder / "design.csv")]
     assert main([*command, "-v", "--out", str(folder / "audit.json"), *options]) == 0
     return json.loads((folder / "audit.json").read_text())
 

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from conftest import RECIPE
+from conftest import MODEL, RECIPE
 from console import printed, rows_of, rows_printed
 
 from soilml.cli import main
@@ -65,6 +65,18 @@ def test_identify_finds_the_model_s_own_soil(model_file, runs_file, tmp_path, ca
     assert json.loads(printed([*command[:-2], "--format", "json"], capsys).out) == content
 
 
+def test_identify_takes_the_rows_of_one_gear(workplace, model_file, capsys):
+    gear = MODEL.partition("[soil]")[0]
+    two = (gear.replace("[gear]", f"[gears.{name}]") for name in ("narrow", "wide"))
+    model_file.write_text(MODEL.replace(gear, "\n".join(two)))
+    lines = ("run,gear,slip,load_N,torque_Nm", "a,narrow,0.1,60,1", "b,wide,0.2,60,2")
+    (workplace / "runs.csv").write_text("\n".join(lines) + "\n")
+    words = ["identify", model_file, "runs.csv", "--method", "nonlinear", "--free", "cohesion"]
+    by_option = printed([*words, "--gear", "narrow"], capsys).out
+    assert printed([*words, "--where", "gear=narrow"], capsys).out == by_option
+    assert by_option.startswith("1 row ")
+
+
 @pytest.mark.slow
 def test_generate_train_estimate_follow_each_other(tmp_path, runs_file, capsys):
     (tmp_path / "recipe.toml").write_text(RECIPE.format(rows=900, seed=2))
@@ -90,12 +102,12 @@ def test_generate_train_estimate_follow_each_other(tmp_path, runs_file, capsys):
 
 def test_soils_and_effects_list_their_catalogues(capsys):
     for words, names in {
-        "soils": ("wong1989/dry_sand", "kphi"),
-        "soils comin2017/es-3": ("published as -830",),
-        "effects": ("slip-sinkage", "grousers", "exit-angle", "bulldozing"),
-        "effects grousers": ("height",),
+        "show soils": ("wong1989/dry_sand",),
+        "show soils comin2017/es-3": ("published as -830",),
+        "show effects": ("slip-sinkage", "grousers", "exit-angle", "bulldozing"),
+        "show effects grousers": ("height",),
     }.items():
         listed = printed(words.split(), capsys).out
         assert all(name in listed for name in names)
-    listed = json.loads(printed(["soils", "--format", "json"], capsys).out)
+    listed = json.loads(printed(["show", "soils", "--format", "json"], capsys).out)
     assert listed["wong1989/dry_sand"]["values"]["n"] == 1.1

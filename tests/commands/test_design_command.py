@@ -27,7 +27,7 @@ friction_angle = [0.5, 0.7]
 slope = "3 deg"
 risk = 0.2
 """
-FEW = ["--designs", "6", "--draws", "50", "--sweep-only"]
+FEW = ["--designs", "6", "--draws", "50"]
 
 
 @pytest.fixture
@@ -39,10 +39,10 @@ def study(tmp_path):
 
 @pytest.mark.slow
 def test_the_answer_is_json_in_a_pipe(study, capsys):
-    content = json.loads(printed(["design", study, *FEW, "--format", "json"], capsys).out)
+    content = json.loads(printed(["plan", "wheels", study, *FEW, "--format", "json"], capsys).out)
     assert content["goal"]["slope_rad"] == pytest.approx(0.05236, abs=1e-5)
     assert content["soils"] == ["ding2015/hit_lss1"]
-    assert len(content["designs"]["width"]) == len(content["designs"]["probability"]) == 6
+    assert len(content["designs"]["width"]) == len(content["designs"]["probability"]) == 12
     best = content["best"]
     assert best["margin_N_p05"] < best["margin_N"] < best["margin_N_p95"]
     assert 0.0 < best["probability"] <= best["probability_climbed"] <= 1.0
@@ -57,7 +57,7 @@ def test_the_soil_of_measured_rows(study, tmp_path, model_file, capsys):
     start, end = STUDY.index("[soil]"), STUDY.index("[goal]")
     text = f'[soil]\nmodel = "{model_file.name}"\nruns = "runs.csv"\n\n'
     study.write_text(STUDY[:start] + text + STUDY[end:])
-    content = json.loads(printed(["design", study, *FEW, "--format", "json"], capsys).out)
+    content = json.loads(printed(["plan", "wheels", study, *FEW, "--format", "json"], capsys).out)
     assert any(one["code"] == "errors-before-rows" for one in content["warnings"])
     assert content["soils"] == [str(tmp_path / model_file.name), str(tmp_path / "runs.csv")]
 
@@ -75,4 +75,4 @@ def test_the_soil_of_measured_rows(study, tmp_path, model_file, capsys):
 )
 def test_bad_input_is_one_line_and_status_two(study, change, options, said, capsys):
     study.write_text(STUDY.replace(*change))
-    refused(["design", study, "--designs", "4", *options], capsys, said)
+    refused(["plan", "wheels", study, "--designs", "4", *options], capsys, said)

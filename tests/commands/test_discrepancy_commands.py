@@ -32,7 +32,7 @@ def spoken(capsys, *command):
 
 @pytest.mark.slow
 def test_bands_of_pull_have_the_error_of_the_model_and_say_so(folder, capsys):
-    command = ("--load", "60", "--slip-limit", "0.4")
+    command = ("--load", "60", "--slip-limit", "0.4", "--exact-model")
     wide = spoken(capsys, "pull", "model.toml", "runs.csv", *command)
     details = spoken(capsys, "pull", "model.toml", "runs.csv", *command, "-v")
     assert "errors of the model (drawbar pull" in " ".join(details.err.split())

@@ -1,11 +1,11 @@
 """`soilml example`: each example runs through the command that it names."""
 
 import pytest
-from console import refused
+from console import refused, rows_of
 
 from soilml import gap
 from soilml.cli import main
-from soilml.cli.commands.example import EXAMPLES
+from soilml.cli.commands.example import NEXT
 
 
 @pytest.mark.slow
@@ -28,10 +28,18 @@ def test_the_log_is_imported_by_the_map_that_is_guessed(workplace, capsys):
 
 
 @pytest.mark.slow
-def test_the_rover_answers_for_slopes(workplace, capsys):
+def test_the_rover_answers_for_slopes_as_a_whole(workplace, capsys):
     assert main(["example", "rover", "."]) == 0
-    assert main(["pull", "rover.toml", "runs.csv", "--slope", "0,10", "--format", "table"]) == 0
-    assert "slope, deg" in capsys.readouterr().out
+    capsys.readouterr()
+    words = ["pull", "rover.toml", "runs.csv", "--slope"]
+    assert main([*words, "0,8", "-v", "--out", "rover.csv", "--picture", "rover.png"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("The rover climbs ") and "slope, deg" in said and "rear-left" in said
+    rows = rows_of((workplace / "rover.csv").read_text())
+    assert [round(float(row["slope_rad"]), 3) for row in rows] == [0.0, 0.14]
+    assert float(rows[1]["slip"]) > float(rows[0]["slip"])
+    assert (workplace / "rover.png").read_bytes().startswith(b"\x89PNG")
+    refused([*words, "58"], capsys, "leaves the ground on a slope of 58 deg")
 
 
 def test_examples_replace_nothing_and_name_each_other(workplace, capsys):
@@ -39,7 +47,7 @@ def test_examples_replace_nothing_and_name_each_other(workplace, capsys):
     refused(["example", "."], capsys, "model.toml exists; give another folder", workplace)
     assert main(["example", "campain", "x"]) == 2
     said = capsys.readouterr().err
-    assert "did you mean 'campaign'" in said and all(name in said for name in EXAMPLES)
+    assert "did you mean 'campaign'" in said and all(name in said for name in NEXT)
 
 
 @pytest.mark.slow

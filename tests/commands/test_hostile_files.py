@@ -47,15 +47,15 @@ def test_a_parquet_file_of_more_rows_than_a_csv_file_may_have_is_refused(tmp_pat
         read_parquet(file)
 
 
-@pytest.mark.parametrize("command", ["identify", "gap", "advise", "pull", "audit"])
+@pytest.mark.parametrize("command", ["identify", "gap", "plan next", "pull", "plan effects"])
 def test_a_file_of_effects_does_not_run_for_a_table_that_is_refused(command, folder, capsys):
     more = {"pull": ["--load", "60", "--slip-limit", "0.3"], "gap": ["--out", "gap"]}
     words = ["model.toml", "runs.csv", "--effects", "own.py", *more.get(command, [])]
-    refused([command, *words], capsys, "no such file", folder)
+    refused([*command.split(), *words], capsys, "no such file", folder)
     (folder / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.1,60,text\n")
-    refused([command, *words], capsys, "", folder)
+    refused([*command.split(), *words], capsys, "", folder)
     (folder / "model.toml").write_text("[gear\n")
-    refused([command, *words], capsys, "", folder)
+    refused([*command.split(), *words], capsys, "", folder)
 
 
 def test_names_of_outputs_are_printed_without_terminal_commands(folder, capsys):

@@ -32,9 +32,7 @@ RUNS = "run,slip,load_N,torque_Nm\na,0.1,60,1.5\na,0.3,80,3.0\na,0.5,90,5.0\n"
     ("module", "words"),
     [
         ("soilml.cli.main", "simulate model.toml --slip 0.1 --load 60"),
-        ("argparse", "simulate model.toml --slip 0.1 --load 60"),
         ("numpy", "simulate model.toml --slip 0.1 --load 60 --out out.csv"),
-        ("numpy.random", "identify model.toml runs.csv --out out.json"),
         ("scipy.special", "identify model.toml runs.csv --out out.json"),
         ("jinja2", "gap model.toml runs.csv --out found"),
         ("pyarrow", "generate wheel out.parquet --rows 10"),
@@ -49,7 +47,9 @@ def test_ctrl_c_in_an_import(tmp_path, small_model, module, words):
         [sys.executable, "-c", INTERRUPTED, module, *words.format(model=small_model).split()],
         cwd=tmp_path, env=environment, capture_output=True, text=True,
     )  # fmt: skip
-    assert done.stderr == "soilml: interrupted; no output was written\n"
+    *progress, said = done.stderr.splitlines()  # a slow machine shows progress before
+    assert said == "soilml: interrupted; no output was written"
+    assert all(line.endswith(" ...") for line in progress)
     assert done.returncode == 128 + signal.SIGINT
     assert sorted(path.name for path in tmp_path.iterdir()) == ["model.toml", "runs.csv"]
 

@@ -109,7 +109,7 @@ def test_a_closed_standard_output_is_one_line(folder):
 def test_files_that_read_the_same_are_not_fused_as_if_they_erred_independently(tmp_path, capsys):
     (tmp_path / "log.csv").write_text("run,slip,load_N,torque_Nm\na,0.2,60,2.1\n")
     words = ["estimate", "wheel", tmp_path / "log.csv", "--with", "wheel"]
-    refused(words, capsys, "their errors are not independent")
+    refused(words, capsys, "do not state their errors on common rows")
 
 
 def test_every_argument_that_names_an_input_file_is_declared_as_one():

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import MODEL
-from console import rows_of
+from console import check_tables, rows_of
 
 from soilml.cli import main
 from soilml.report.numbers import pretty
@@ -61,6 +61,7 @@ COMMANDS = {
 def test_a_report_is_a_page_and_a_file_with_what_was_asked_and_found(folder, kind, capsys):
     command = [*COMMANDS[kind], "--report", "found/deeper"]
     assert main(command) == 0
+    check_tables(capsys.readouterr().out)
     place = folder / "found" / "deeper"
     assert sorted(path.name for path in place.iterdir()) == ["report.html", "report.json"]
     html = (place / "report.html").read_text()

@@ -9,51 +9,38 @@ from soilml.onboard.model_file import released_models
 
 
 @pytest.mark.parametrize("soil", [[], ["--soil", "wong1989/dry_sand"]])
-@pytest.mark.parametrize(
-    "rover", ["", "--mass 12 --wheels 6 --wheelbase 0.8 --track 0.6 --height 0.3"]
-)
-def test_the_first_model_file_is_one(tmp_path, capsys, soil, rover):
+def test_the_first_model_file_is_one(tmp_path, capsys, soil):
     file = tmp_path / "model.toml"
-    words = ["init", str(file), "--radius", "0.1", "--width", "0.08", *soil, *rover.split()]
-    assert main([*words, "--torque-noise", "3 % + 0.02"]) == 0
+    assert main(["init", str(file), "--radius", "0.1", "--width", "0.08", *soil]) == 0
     case = read_case(file)
     assert (case.model.gear.radius, case.model.gear.width) == (0.1, 0.08)
-    assert (case.noise["torque_Nm"].share, case.noise["torque_Nm"].constant) == (0.03, 0.02)
+    assert case.noise["torque_Nm"].share == 0.02
     assert {"cohesion", "friction_angle", "shear_modulus"} <= set(case.prior)
     assert ("kphi" in case.prior) == (not soil)
-    assert (case.rover is not None) == bool(rover)
-    if rover:
-        assert len(case.rover.wheels) == 6
-        assert case.rover.loads(0.2).min() > 0.0
     assert "Next: soilml identify" in capsys.readouterr().out
 
 
 @pytest.mark.slow
 def test_models_lists_them(capsys):
-    assert main(["models"]) == 0
+    assert main(["show", "models"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 4 + len(released_models())  # header, rule, two lines of notes
+    assert {line.split()[0] for line in lines if line} >= set(released_models())
     assert any(line.startswith("wheel ") and "wheel 150, 120" in line for line in lines)
     assert max(map(len, lines)) <= 80
 
 
 @pytest.mark.slow
 def test_doctor_finds_nothing_wrong_here_and_says_what_is_missing(capsys, monkeypatch):
-    assert main(["doctor"]) == 0
+    assert main(["setup", "check"]) == 0
     assert "nothing is wrong" in capsys.readouterr().out
     monkeypatch.setattr("soilml.cli.commands.doctor._version", lambda name: "")
-    assert main(["doctor"]) == 1
+    assert main(["setup", "check"]) == 1
     assert "! onnxruntime is missing: pip install onnxruntime" in capsys.readouterr().out
 
 
 def test_init_takes_sizes_with_their_units(workplace, capsys):
-    names = ("--radius", "--width", "--mass", "--wheelbase", "--track", "--height")
-    for file, sizes in {
-        "a.toml": ("150 mm", "12 cm", "8 kg", "60 cm", "500 mm", "0.2 m"),
-        "b.toml": ("0.15", "0.12", "8", "0.6", "0.5", "0.2"),
-    }.items():
-        words = [word for pair in zip(names, sizes, strict=True) for word in pair]
-        assert main(["init", file, *words]) == 0
+    for file, radius, width in (("a.toml", "150 mm", "12 cm"), ("b.toml", "0.15", "0.12")):
+        assert main(["init", file, "--radius", radius, "--width", width]) == 0
     assert (workplace / "a.toml").read_text() == (workplace / "b.toml").read_text()
     words = ["init", "c.toml", "--radius", "15 inch", "--width", "0.1"]
     needed = "needed is a number in m, or a text with one of the units m"

@@ -1,21 +1,15 @@
 """What all commands print on a terminal: usual units, rounded numbers, at most 80 columns."""
 
-import re
 from pathlib import Path
 
 import pytest
 from conftest import THREE_CHANNEL_MODEL
+from console import check_tables
 
 from soilml.cli import main
 from soilml.cli.main import COMMANDS
 
 ROOT = Path(__file__).parents[2]
-#: A number with more digits than anybody reads.
-RAW = re.compile(r"\d\.\d{6,}")
-#: An SI unit in the name of a column, and one beside a number or as a cell.
-SI_COLUMN = re.compile(r"_(Pa|rad|m)(?!_s)(?=[\s_]|$)")
-SI_UNIT = re.compile(r"(?<=[\d.] )(Pa|rad)\b|  (Pa|rad)\b")
-
 RUNS = """\
 run,slip,load_N,torque_Nm,drawbar_pull_N,sinkage_m
 a,0.1,40,0.75,-3.1,0.0112
@@ -30,26 +24,21 @@ PLATES = "test,plate_radius_m,sinkage_m,load_N\n" + "".join(
     for i, r in enumerate((0.04, 0.06))
     for z in (0.005, 0.01, 0.02, 0.03)
 )
-LINEAR = str(ROOT / "exported/wheel_linear.onnx")
 WORDS = {
-    "show models": [],
     "setup check": [],
-    "show soils": [],
-    "show effects": [],
+    "show": ["soils"],
     "simulate": ["m.toml", "--slip", "0.1,0.5", "--load", "60,1e6", "--speed", "0.1"],
-    "identify": ["m.toml", "runs.csv", "--by", "run"],
     "bevameter": ["plates.csv"],
     "plan effects": ["m.toml", "runs.csv", "--ignore-extra", "-v"],
-    "gap": ["m.toml", "runs.csv", "--out", "gap"],
-    "estimate": [LINEAR, "runs.csv"],
     "plan next": ["m.toml", "runs.csv"],
     "pull": ["m.toml", "runs.csv", "--load", "60", "--slip-limit", "0.3"],
-    "plan wheels": ["rover.toml", "--designs", "9", "--draws", "50", "--sweep-only"],
+    "plan wheels": ["rover.toml", "--designs", "9", "--draws", "50"],
     "paper walk": ["--ground", "SSC-1,SSC-2", "--legs", "5"],
     "paper numbers": ["comin2017-slip"],
 }
 #: Commands whose tables have tests of their own, or that print none.
 ELSEWHERE = {
+    *("identify", "estimate", "pull", "gap"),
     *("init", "example", "setup completion", "serve", "import", "generate", "train", "adapt"),
     *("compare", "plan runs", "export c", "export slip"),
     "export soil",  # in the units of the program that it writes for
@@ -62,19 +51,6 @@ def test_every_command_is_looked_at():
     assert {*WORDS, *ELSEWHERE} == set(COMMANDS)
 
 
-def tables(text):
-    """The lines of tables: those about a line of dashes, and below it up to a blank line."""
-    lines, found = text.splitlines(), []
-    for i, line in enumerate(lines):
-        if line and set(line) <= {"-", " "}:
-            found.append(lines[i - 1])
-            for row in lines[i:]:
-                if not row or row.startswith("!"):
-                    break
-                found.append(row)
-    return found
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [c for c in WORDS if c != "paper numbers"])
 def test_tables_are_narrow_rounded_and_in_usual_units(command, workplace, capsys):
@@ -83,10 +59,4 @@ def test_tables_are_narrow_rounded_and_in_usual_units(command, workplace, capsys
     (workplace / "plates.csv").write_text(PLATES)
     (workplace / "rover.toml").write_text((ROOT / "examples/design/rover.toml").read_text())
     assert main([*command.split(), *WORDS[command]]) == 0
-    found = tables(capsys.readouterr().out)
-    assert found
-    assert not SI_COLUMN.search(found[0])
-    for line in found:
-        assert len(line) <= 80, line
-        assert not RAW.search(line), line
-        assert not SI_UNIT.search(line), line
+    check_tables(capsys.readouterr().out)

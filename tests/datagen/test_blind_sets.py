@@ -74,7 +74,7 @@ def apart(one, other):
 def test_a_cause_in_its_usual_form_is_the_packages_effect(name):
     if name not in OF_SOILML:
         pytest.skip("not hidden in any set")
-    cause, cls, rows = OF_SOILML[name], EFFECTS[name], batch(120, seed=3)
+    cause, cls, rows = OF_SOILML[name], EFFECTS[name], batch(60, seed=3)
     effect = cls(**{cls.about.size: cause.reference})
     ours, theirs = of_hidden(rows, ((cause, cause.reference),)), of_soilml(rows, [effect])
     assert np.isfinite(ours).all()
@@ -161,7 +161,7 @@ def test_the_shape_acts_on_both_halves_of_the_contact_with_its_largest_stress():
 @pytest.mark.parametrize("design", DESIGNS)
 def test_a_design_is_driven_as_it_says(design):
     runs = {"one-run": 1, "few-runs": 3, "few-rows": 1}.get(design, 8)
-    for seed in range(2):
+    for seed in range(2 if design == "missing-channels" else 1):
         drawn = draw_blind_set(replace(PLAN, design=design, runs=runs, seed=seed))
         columns = drawn.columns
         load, run = columns["load_N"], columns["run"]

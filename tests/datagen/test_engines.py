@@ -50,14 +50,14 @@ def test_workers_end_when_the_process_is_killed():
 def test_a_file_has_the_same_bytes_whatever_the_number_of_processes(tmp_path, monkeypatch):
     monkeypatch.setattr("datagen.generate.pieces", functools.partial(pieces, size=256))
     blocks = "[[runs]]\nrows = 1\nshare = 0.5\n[[runs]]\nrows = 8\nshare = 0.5\n"
-    (tmp_path / "recipe.toml").write_text(RECIPE.format(rows=2000, seed=1) + blocks)
+    (tmp_path / "recipe.toml").write_text(RECIPE.format(rows=1000, seed=1) + blocks)
     recipe = read_recipe(tmp_path / "recipe.toml")
     found = set()
-    for workers, method in ((1, None), (2, "fork"), (3, "fork"), (2, "spawn")):
+    for workers, method in ((1, None), (3, "fork"), (2, "spawn")):
         done = []
         engine = functools.partial(process_map, workers=workers, start_method=method)
         generate(recipe, tmp_path / "d.parquet", done.append, engine)
-        assert done == sorted(done) and done[-1] == 2000 and len(done) == 8
+        assert done == sorted(done) and done[-1] == 1000 and len(done) == 4
         found.add(hashlib.sha256((tmp_path / "d.parquet").read_bytes()).hexdigest())
     assert len(found) == 1
 

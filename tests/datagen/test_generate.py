@@ -1,11 +1,6 @@
 """Synthetic data: reproducible, whole, calibrated, and honest about failures."""
 
 import hashlib
-import os
-import signal
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
@@ -118,28 +113,6 @@ def test_a_recipe_that_mostly_fails_is_refused_and_leaves_nothing(tmp_path):
     with pytest.raises(InputError, match="no equilibrium"):
         generate(recipe(tmp_path, text=text), tmp_path / "d.parquet")
     assert not list(tmp_path.glob("*parquet*"))
-
-
-@pytest.mark.slow
-def test_killed_half_way_leaves_no_file_and_the_next_one_is_whole(tmp_path):
-    made = recipe(tmp_path, rows=3_000_000)
-    target = tmp_path / "d.parquet"
-    code = "import sys; from soilml.cli import main; sys.exit(main(sys.argv[1:]))"
-    command = [sys.executable, "-c", code, "generate", str(tmp_path / "recipe.toml"), str(target)]
-    parts = ".d.parquet.*.part"
-    for stop in (signal.SIGINT, signal.SIGKILL):
-        process = subprocess.Popen(command, stderr=subprocess.PIPE)
-        deadline = time.monotonic() + 60
-        while not any(part.stat().st_size > 10_000 for part in tmp_path.glob(parts)):
-            assert time.monotonic() < deadline and process.poll() is None
-            time.sleep(0.01)
-        os.kill(process.pid, stop)
-        process.communicate()
-        assert process.returncode != 0
-        assert not target.exists()
-        assert bool(list(tmp_path.glob(parts))) == (stop == signal.SIGKILL)
-    generate(made.sized(500), target)
-    assert len(read_table(target)) == 500
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,6 @@ import pytest
 import soilml
 from soilml.cli import main
 from soilml.cli.main import COMMANDS, parser
-from soilml.cli.old_spellings import present_words
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "docs/site"))
@@ -53,7 +52,7 @@ def test_notebooks_have_cells_that_parse_and_commands_that_exist(page):
         ast.parse(notebooks.COMMAND.sub("pass", cell))
     for line in notebooks.commands(page):
         program, *words = shlex.split(line)
-        assert program == "soilml" and present_words(words) == words, line
+        assert program == "soilml", line
         parser(words).parse_args(words)
 
 

@@ -12,7 +12,7 @@ from packaging.requirements import Requirement
 sys.path.insert(0, str(Path(__file__).parents[2] / "tools"))
 
 
-from packages import LOCKED, SUPPLY, TOOLS, audited, licence, lock_command
+from packages import LOCKED, SUPPLY, audited
 
 ROOT = Path(__file__).parents[2]
 
@@ -42,11 +42,6 @@ def test_locked_versions_are_the_tested_ones_and_all_have_hashes(name):
     assert not any(package.startswith("nvidia") or package == "torch" for package in locked)
 
 
-def test_a_lock_asks_for_hashes_and_the_tested_versions():
-    command = lock_command(TOOLS, "ground-hashes.txt")
-    assert {"--generate-hashes", "--constraint=constraints.txt", "--extra=ground"} <= set(command)
-
-
 def test_packages_that_were_not_compared_are_not_taken_for_sound():
     report = {
         "dependencies": [
@@ -56,8 +51,3 @@ def test_packages_that_were_not_compared_are_not_taken_for_sound():
         ]
     }
     assert audited(json.dumps(report)) == (2, ["c"], ["b 2: CVE-1"])
-
-
-def test_the_licence_of_an_installed_package_is_found():
-    assert "BSD" in licence("numpy")
-    assert licence("no-such-package") == "not installed here"

@@ -9,7 +9,6 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.onboard.estimate import EDGE_STDS
-from soilml.onboard.exact_check import MARGIN
 from soilml.onboard.set_contract import LEAST_SHARE_IN_RANGE, SET_PREFIX
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from training.onnx_graph.value import (
@@ -37,6 +36,10 @@ DISTANCES = np.arange(0.5, 3.3, SPACING)
 #: Largest sum of squared weights that is taken into account: one point alone has 1.
 LARGEST_SHARE = 0.95
 LEAST_SHARE = 1e-6  # Least share of the sample between two grid points that is divided by
+#: Beyond the largest calibrated number of readings n the limit grows by 1 + 3 / sqrt(n) a reading:
+#: that of a chi-squared distribution with n degrees of freedom is n + 3 sqrt(n) to 3 standard
+#: deviations, roughly, and a straight line through it lies above it.
+MARGIN = 3.0
 
 
 @dataclass(frozen=True)

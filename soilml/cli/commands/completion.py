@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable
 
-from soilml.cli.options import leaves
+from soilml.cli.options import InputFile, leaves
 
 DESCRIPTION = """\
-Print a script with which a shell completes commands, options, soils, effects,
-released model files and file names. For a shell, and for good:
+Print a script with which a shell completes commands, options, soils, effects
+and file names. For a shell, and for good:
 
   eval "$(soilml setup completion bash)"             # or zsh
   soilml setup completion fish | source
@@ -36,58 +36,39 @@ def run(args: argparse.Namespace) -> int:
     for action in root._actions:  # shtab leaves out what the help leaves out
         if action.metavar == "COMMAND":
             action.help = "command"
+    known = _names()
     for name, command in leaves(root):
         for action in command._actions:
-            if action.choices is None and action.nargs != 0:
-                _complete(action, name)
+            if action.choices is None:
+                action.choices = known.get(f"{name} {action.dest}") or known.get(action.dest)
+            if action.choices is None and _is_file(action):
+                action.complete = shtab.FILE
     write_stdout(shtab.complete(root, args.shell))
     return 0
 
 
-def _complete(action: argparse.Action, command: str) -> None:
-    """Declare for shtab what an argument may be: known names, files, or both."""
-    from shtab import FILE
-
-    metavar = str(action.metavar or action.dest)
-    names = " ".join(_names(command, action.dest, metavar))
-    file = any(
-        ending in metavar.replace("...", "") for ending in ("FILE", "LOG", "FOLDER", ".")
-    ) or (getattr(action.type, "__name__", "") == "InputFile")
-    if file and names:
-        function = f"_soilml_{command}_{action.dest}".replace("-", "_").replace(" ", "_")
-        action.complete = {  # type: ignore[attr-defined]
-            "bash": function,
-            "zsh": f"{{compadd {names}; _files}}",
-            "fish": f"(printf '%s\\n' {names}; __fish_complete_path (commandline -ct))",
-            "preamble": {
-                "bash": f'{function}() {{ compgen -W "{names}" -- "$1"; compgen -f -- "$1"; }}'
-            },
-        }
-    elif file:
-        action.complete = FILE  # type: ignore[attr-defined]
-    elif names:
-        action.choices = names.split()
+def _is_file(action: argparse.Action) -> bool:
+    """Whether an argument is the name of a file or a folder, which its metavar tells."""
+    metavar = str(action.metavar or "").replace("...", "")
+    return action.type is InputFile or any(
+        part in metavar for part in ("FILE", "LOG", "FOLDER", ".")
+    )
 
 
-def _names(command: str, dest: str, metavar: str) -> Iterable[str]:
-    """Names that are known for an argument."""
+def _names() -> dict[str, Iterable[str]]:
+    """Names that are known, by argument, or by command and argument."""
     from soilml.config.wheeled_rover import GRAVITY
     from soilml.identification import METHODS
-    from soilml.onboard.model_file import released_models
     from soilml.physics.effects import EFFECTS
     from soilml.physics.soils import soil_catalogue
     from soilml.physics.soils.gravity_law import LAWS
 
-    if ".onnx" in metavar and "OUT" not in metavar:
-        return released_models()
-    known: dict[str, Iterable[str]] = {
-        "show soils name": soil_catalogue(),
-        "show effects name": EFFECTS,
-        "soil": soil_catalogue(),
-        "method": METHODS,
-        "gravity_law": LAWS,
-        "gravity": GRAVITY,
-        "tested_at": GRAVITY,
-        "by": ("run", "gear"),
+    return {
+        "show name": [*soil_catalogue(), *EFFECTS],
+        "soil": list(soil_catalogue()),
+        "method": list(METHODS),
+        "gravity_law": list(LAWS),
+        "gravity": list(GRAVITY),
+        "tested_at": list(GRAVITY),
+        "by": ["run", "gear"],
     }
-    return known.get(dest) or known.get(f"{command} {dest}", ())

@@ -54,11 +54,10 @@ ARGUMENTS = (
     ("--gravity G", "gravity: earth, moon, mars, or in m/s^2"),
     ("--soil PAPER/SOIL,...", "published soils, each as likely"),
     ("--risk P", "probability of failing that is accepted", NumberFrom(0.001, 0.5)),
-    ("--designs N (250)", "designs of the sweep", whole_number_from(1, 100_000)),
+    ("--designs N (250)", "designs of the first round", whole_number_from(1, 100_000)),
     ("--draws N (1000)", "draws of soil and model error", whole_number_from(50, 20_000)),
-    ("--sweep-only", "do not search between the designs of the sweep"),
     ("--out FILE.json", "write the result to this file", OutputFile),
-    ("--picture FILE.png", "draw contours, front and shares", OutputFile),
+    ("--picture FILE.png", "draw designs, front and shares", OutputFile),
     "report",
 )
 
@@ -78,7 +77,6 @@ def run(args: argparse.Namespace) -> int:
             study,
             designs=args.designs,
             draws=args.draws,
-            optimise=not args.sweep_only,
             progress=progress,
         )
     report = found.report(f"Wheels for {Path(args.study).name}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Iterator
 from importlib import metadata
@@ -11,33 +12,14 @@ from soilml.errors import SoilmlError
 
 DESCRIPTION = """\
 Check this installation: which libraries are present and in which version, what
-cannot be done without the missing ones, and whether a released model file
-gives its known answers on this machine. The exit status is 1 where something
-that the installed parts need does not work.
+brings the missing ones (pip install '.[EXTRA]'), and whether the released
+model files give their known answers on this machine. The exit status is 1
+where something that the installed parts need does not work.
 """
-#: What needs each library, beside the board's own two.
-USES = {
-    "numpy": "everything",
-    "onnxruntime": "estimate, pull --from: model files",
-    "scipy": "identify, gap, pull, generate",
-    "pyarrow": "Parquet tables; generate, train",
-    "python-calamine": "spreadsheets (.xlsx)",
-    "pint": "import",
-    "h5py": "import of MATLAB 7.3",
-    "mcap": "import of MCAP",
-    "rosbags": "import of ROS bags",
-    "matplotlib": "pictures",
-    "jinja2": "report of gap; export c",
-    "onnx": "train, export c",
-    "torch": "generate --device; gradients of the forward model",
-    "scikit-learn": "train",
-    "array-api-compat": "the forward model on torch tensors",
-    "shtab": "completion",
-    "tornado": "serve",
-    "tifffile": "drive map",
-    "threadpoolctl": "gap, generate, train",
-}
-NEEDED = ("numpy", "onnxruntime")  # The libraries without which nothing works
+#: Extras for those who develop soilml.
+_DEVELOPMENT = ("browser", "coverage", "dev", "docs", "mutation")
+#: The name of a library that the package asks for, and the extra that brings it.
+_REQUIRED = re.compile(r"([\w.-]+)[^;]*(?:;.*extra == '(\w+)')?")
 ARGUMENTS = ()
 
 
@@ -51,8 +33,8 @@ def run(args: argparse.Namespace) -> int:
 
     print(f"soilml {__version__}, Python {platform.python_version()}, {platform.platform()}")
     print(f"{usable_cores()} usable cores; {sys.executable}\n")
-    rows = [(name, _version(name) or "-", use) for name, use in USES.items()]
-    print(format_table(("library", "version", "needed for"), rows, text_columns=3))
+    rows = [(name, _version(name) or "-", extra or "") for name, extra in _libraries()]
+    print(format_table(("library", "version", "extra"), rows, text_columns=3))
     problems = list(_problems())
     print()
     for text in problems:
@@ -60,6 +42,14 @@ def run(args: argparse.Namespace) -> int:
     if not problems:
         print("released model files give their known answers; nothing is wrong")
     return 1 if problems else 0
+
+
+def _libraries() -> Iterator[tuple[str, str | None]]:
+    """Libraries and the extra of each, None where everything needs it."""
+    for text in metadata.requires("soilml") or ():
+        found = _REQUIRED.match(text)
+        if found and found[1] != "tomli" and found[2] not in _DEVELOPMENT:
+            yield found[1], found[2]
 
 
 def _version(name: str) -> str:
@@ -70,11 +60,10 @@ def _version(name: str) -> str:
 
 
 def _problems() -> Iterator[str]:
-    """What does not work: missing or too old libraries, model files that fail."""
-    for name in NEEDED:
-        if not _version(name):
-            yield f"{name} is missing: pip install {name}"
-    if not all(_version(name) for name in NEEDED):
+    """What does not work: missing libraries, model files that fail."""
+    missing = [name for name, extra in _libraries() if extra is None and not _version(name)]
+    yield from (f"{name} is missing: pip install {name}" for name in missing)
+    if missing:
         return
     from soilml.onboard.estimator import Estimator
     from soilml.onboard.model_file import released_models

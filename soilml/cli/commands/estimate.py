@@ -11,8 +11,6 @@ from soilml.errors import InputError
 
 if TYPE_CHECKING:
     from soilml.onboard.estimator import Estimator
-    from soilml.onboard.table_estimates import TableEstimates
-    from soilml.remarks import Remark
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
@@ -65,8 +63,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import deliver, show
     from soilml.cli.progress import progress_bar
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
+    from soilml.config.compatibility import recipe_case
     from soilml.config.remainder import SAME_ROWS
-    from soilml.experiment_design.expected_answers import trained_case
     from soilml.identification.model_error_inputs import (
         readings_with_model_error,
         trained_remainder,
@@ -113,8 +111,9 @@ def run(args: argparse.Namespace) -> int:
         return 0
     for estimator in estimators:
         check_table_wheel(estimator, table)
-    trained = None if case is not None else trained_case(estimators[0])
-    hinted = case if trained is None else trained[0]
+    hinted = case
+    if case is None and not estimators[0].per_row:
+        hinted = recipe_case(estimators[0].metadata["recipe"], estimators[0].path)
     print_table_hints(table, hinted, presentation.trained_radius(estimators[0]))
     pooled, first = args.by is not None, estimators[0]
     box = narrower_priors(first, case) if case is not None and pooled else {}
@@ -125,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
         ),
     )  # fmt: skip
     columns = found.columns(list(dict.fromkeys(n for one in estimators for n in one.inputs)))
-    remarks += presentation.remarks_on(found, estimators) + _advice(found)
+    remarks += presentation.remarks_on(found, estimators)
     if args.report is not None:
         presentation.check_size(len(columns["in_range"]))
 
@@ -141,40 +140,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
     """Raise `InputError` for options that cannot be combined."""
-    from soilml.onboard import table_estimates
-    from soilml.onboard.joint_errors import are_comparable
-
     if args.runs is None and any((args.by, args.where, args.out, args.report)):
         raise InputError("RUNS.csv is missing: --by, --where, --out and --report are for its rows")
     if args.by is not None and args.with_:
         raise InputError("--with fuses single rows; omit --by")
-    if not are_comparable([e.errors for e in estimators]):
-        table_estimates.check_independent(estimators)
     if args.by is not None and estimators[0].per_row:
         raise InputError(
             f"{args.trained} estimates {estimators[0].per_row[0]}, which differs from row to row "
             "of a run; omit --by"
         )
-
-
-def _advice(found: TableEstimates) -> list[Remark]:
-    """What to measure after a typical row, or after the group that is known least."""
-    import numpy as np
-
-    from soilml.experiment_design.next_rows import advice_after_estimate
-    from soilml.io.table import ALL
-    from soilml.onboard import presentation, table_estimates
-
-    place = presentation.typical(found)
-    if place is None or found.rule is not None:
-        return []
-    if found.by is None:
-        row = found.table.rows(np.asarray([place]))
-        readings = table_estimates.row_readings(found.estimator, row)
-        head = f"after {found.table.place(place)} alone, a typical row: "
-    else:
-        readings = found.readings[int(found.answered[:place].sum())]
-        head = "" if found.by == ALL else f"{found.by} {found.names[place]}: "
-    own = found.estimate.mean[place], found.estimate.covariance[place]
-    advised = advice_after_estimate(found.estimator, *own, readings, found.box)
-    return [one.under(head) for one in (advised[-1:] if found.by is None else advised)]

@@ -21,7 +21,6 @@ of the equations, of what is ignored and of what no wheel test reveals.
 FIT.json is the file that `soilml identify --out` wrote, or a model file.
 Targets:
   chrono      Project Chrono, deformable terrain SCM
-  chrono-crm  Project Chrono, continuum terrain CRM
   gazebo      soil_params.yaml of gz-terramechanics, and friction of SDFormat
   isaac       physics material for Isaac Sim and Isaac Lab: friction alone
   csv         the parameters in SI units
@@ -31,12 +30,12 @@ posterior is that of the methods averaged and posterior; of a model file, draws
 are those of its priors. Parameters that rows cannot reveal, such as elastic_K
 of Chrono, have a default that is named as such; --set gives your value.
 
-FOLDER has the files, README.md, and export.json with the remarks. A warning
+FOLDER has the files, README.txt, and export.json with the remarks. A warning
 says where one file hides that a parameter is not determined.
 """
 ARGUMENTS = (
     ("fit FIT.json", "result of identify, or MODEL.toml", InputFile),
-    ("--to TARGET", "chrono, chrono-crm, gazebo, isaac or csv", REQUIRED),
+    ("--to TARGET", "chrono, gazebo, isaac or csv", REQUIRED),
     ("--out FOLDER", "folder for the files", REQUIRED),
     ("--draws N (0)", "number of soils drawn from the posterior", whole_number_from(0)),
     ("--set NAME=VALUE", "value that rows cannot reveal; can be repeated", REPEATED),
@@ -47,14 +46,12 @@ ARGUMENTS = (
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files of the folder that every export has."""
-    return folder_outputs("--out", args.out, ("README.md", "export.json"))
+    return folder_outputs("--out", args.out, ("README.txt", "export.json"))
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the folder and say what is in it."""
-    from soilml.cli.output import show
-    from soilml.report.aligned_text import format_table
-    from soilml.report.numbers import significant
+    from soilml.cli.output import show_result
     from soilml.soil_export import export_soil
 
     given = named_numbers(args.set, "--set", "NAME=NUMBER, such as elastic_K=1e8")
@@ -71,13 +68,5 @@ def run(args: argparse.Namespace) -> int:
         seed=args.seed,
         words=words,
     )
-    units = export.target.units
-    rows = [
-        (name, export.origin(name), significant(value), "" if units[name] == "1" else units[name])
-        for name, value in export.values.items()
-    ]
-    table = format_table(("parameter", "known from", "value", "unit"), rows, text_columns=2)
-    count = f", {len(export.draws)} draws" if export.draws else ""
-    head = f"{args.out}: {export.target.name}{count}; README.md says what is ignored"
-    show("\n".join([head, "", table, *(f"! {remark}" for remark in export.remarks)]))
+    show_result(export.report(), {})
     return 0

@@ -72,11 +72,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
     from soilml.optional_imports import need
-    from soilml.remarks import texts
 
     need("scipy", "identify")
-    from soilml.experiment_design.next_rows import advice_after_fit
-    from soilml.experiment_design.presentation import advice_as_json, next_row_remarks
     from soilml.identification import identify
     from soilml.identification.report import fit_report, group_report, soil_entries
 
@@ -89,22 +86,18 @@ def run(args: argparse.Namespace) -> int:
     print_table_hints(table, case)
     free = parse_names(args.free)
 
-    def solve(rows: Table) -> tuple[Fit, dict[str, Any], list[str]]:
+    def solve(rows: Table) -> tuple[Fit, dict[str, Any]]:
         fit = identify(case, rows, free, args.method)
-        advice = None if fit.samples is None else advice_after_fit(case, rows, free, fit)
         content = fit.as_json() | soil_entries(case, fit, with_draws=args.by is None)
-        fit = replace(fit, samples=None)  # those of thousands of runs are not kept together
-        if advice is None:
-            return fit, content, []
-        return fit, content | advice_as_json(advice), texts(next_row_remarks(advice))
+        return replace(fit, samples=None), content  # not those of thousands of runs together
 
     found, failed = result_by_group(args, table, "identifying", solve)
     title = f"Soil of {Path(args.runs).name}, by the model {Path(args.model).name}"
-    fits = {name: fit for name, (fit, _, _) in found.items()}
-    runs = {name: own for name, (_, own, _) in found.items()}
+    fits = {name: fit for name, (fit, _) in found.items()}
+    runs = {name: own for name, (_, own) in found.items()}
     if args.by is None:
-        (content,), ((fit, _, steps),) = runs.values(), found.values()
-        report = fit_report(fit, steps, title)
+        (content,), (fit,) = runs.values(), fits.values()
+        report = fit_report(fit, title)
     else:
         content = {"by": args.by, "runs": runs, "failed": failed}
         report = group_report(fits, failed, args.by, title)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from soilml.cli.options import SEVERAL, InputFile
@@ -58,22 +57,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
         raise InputError("--explain prints the evidence for each guess of --init; give both")
     if args.map is None:
         raise InputError("--map is missing; soilml import --init LOG... --out MAP.toml writes one")
-    # `import *.csv` a second time finds the table of the first time among the logs
-    others = [file for file in args.files if not _is_that_table(file, args.out)]
-    if others and len(others) < len(args.files):
-        print(f"! {args.out} is a table of runs and no log: it is written anew", file=sys.stderr)
-        args.files = others
     return output_files(args.out, *SUFFIXES)
-
-
-def _is_that_table(file: str, out: str | None) -> bool:
-    """Whether a file is the table that is to be written, as an earlier import has written it."""
-    if out is None or not Path(out).is_file() or not Path(out).samefile(file):
-        return False
-    with Path(file).open("rb") as opened:
-        return opened.readline(200).startswith(
-            (b"run,slip,", b"run,gear,slip,", b"run,wheel,slip,")
-        )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -16,7 +16,6 @@ climbing, the slip that slopes need, and the work of the wheels.
 
   soilml drive map ROVER.toml DRIVE.csv --out map
   soilml drive map ROVER.toml DRIVE.csv --slope 0,10,20 --cell 0.25 --out map
-  soilml drive map ROVER.toml DRIVE.csv --elevation dem.tif --out map
 
 DRIVE.csv has x_m, y_m, slip, torque_Nm and load_N; several wheels also wheel
 and time_s. Positions are those of the wheel's contact, or those of the rover's
@@ -29,9 +28,7 @@ process over position joins them.
 
 The folder has map.tif (GeoTIFF), costmap.yaml and costmap.pgm for Nav2, whose
 occupancy is the probability of not climbing the steepest slope of --slope,
-map.png and map.json. With --elevation, a GeoTIFF of heights in the same
-coordinates, headings.tif has slope, probability, slip and work along eight
-headings, and the occupancy is that of the worst of them.
+map.png and map.json.
 """
 ARGUMENTS = (
     ("rover ROVER.toml", "wheel, soil, rover", InputFile),
@@ -40,7 +37,6 @@ ARGUMENTS = (
     ("--slope DEG,...", "slopes in degrees (default: 0,5,10,15)"),
     ("--cell M", "side of a cell (default: 0.5)", SIZE),
     ("--reach M", "distance from a reading up to which the soil is known (default: 2)", SIZE),
-    ("--elevation DEM.tif", "heights of the terrain, m", InputFile),
     ("--epsg CODE", "projected system of x and y, for map.tif", whole_number_from(1024, 32766)),
     "effects",
     "rows",
@@ -69,7 +65,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.optional_imports import need
     from soilml.soil_maps.local_soils import NEEDED
     from soilml.soil_maps.presentation import FILES, map_files, map_json
-    from soilml.soil_maps.raster import read_elevation
     from soilml.soil_maps.workflow import CELL, REACH, SLOPES, soil_map
 
     if args.out is not None:
@@ -88,7 +83,6 @@ def run(args: argparse.Namespace) -> int:
             reach=REACH if args.reach is None else args.reach,
             slopes=SLOPES if args.slope is None
             else np.deg2rad(np.sort(parse_numbers("--slope", args.slope))),
-            elevation=None if args.elevation is None else read_elevation(args.elevation),
             progress=progress,
         )  # fmt: skip
     report = found.report()

@@ -4,59 +4,53 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.option_values import SLIP
-from soilml.cli.options import InputFile, OutputFile, gravity_change
+from soilml.cli.options import OutputFile, gravity_change
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
-    from soilml.config.case import Case
-    from soilml.io.table import Table
-    from soilml.onboard.estimator import Estimator
     from soilml.traction.report import PullReport
-    from soilml.traction.rover_report import RoverReport
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
 Predict the drawbar pull of a running gear against slip on the soil of the
-measured rows, and the slope that a vehicle with such gears can climb, both
-with 90 % bands.
+measured rows, the steepest slope of a vehicle with such gears, and the slip,
+margin and work that slopes need, with 90 % bands.
 
   soilml pull MODEL.toml RUNS.csv --load 80,120 --slip-limit 0.3 --out pull.csv
-  soilml pull MODEL.toml RUNS.csv --from exported/wheel.onnx
   soilml pull ROVER.toml RUNS.csv --slope 0,10,15 --gravity moon
   soilml pull MODEL.toml RUNS.csv --load 20 --gravity 1.62 --tested-at 9.81
 
 RUNS.csv is that of `soilml identify`. Soil, effects that the model may lack
-and its smooth error are drawn from one posterior given the rows, or the soil
-from the estimate of a trained file (--from). All rows are assumed to come from
-one soil, unless --by run asks for a result for each run.
+and its smooth error are drawn from one posterior given the rows. All rows are
+assumed to come from one soil, unless --by run asks for a result for each run.
 
 Loads are those of the rows, unless --load names others; slips reach 0.6, the
 highest measured slip, or --slip-limit. The bands include errors of the model,
 but neither load transfer nor side slopes.
 
 A model file with [rover] answers for the whole rover, unless --load or --gear
-names one wheel: the slip that slopes need, the margin of pull, the work of the
-wheels for each metre, the steepest slope and the best slip.
+names one wheel.
 
 --gravity predicts for another gravity than that of the rows. How a soil
 changes with it is disputed: by default the law is open, and in the bands.
 
-pull, p05, p95 are the median and the 90 % band; `prior` is the band before any
-measurement. The CSV file has a row for each load and slip, in SI units.
+p05 and p95 are the ends of the 90 % band; `prior` is the band before any
+measurement. The CSV file has a row for each load and slip, of a rover for each
+slope, in SI units.
 """
 MAX_LOADS = 8  # Largest number of loads
 ARGUMENTS = (
     "model-and-runs",
     ("--load N,...", "vertical loads in N: A,B,... or start:stop:count"),
-    ("--slope DEG,...", "slopes of a rover in degrees"),
+    ("--slope DEG,...", "slopes in degrees (default: 0,5,10,15,20)"),
     "gravity",
     ("--slip-limit S", "largest slip considered", SLIP),
     "free",
-    ("--from MODEL.onnx", "use the soil that this trained file estimates", InputFile),
     "effects",
     "by",
     "rows",
@@ -69,6 +63,8 @@ ARGUMENTS = (
 
 def run(args: argparse.Namespace) -> int:
     """Predict and write the results."""
+    import numpy as np
+
     from soilml.cli.option_values import parse_names, parse_numbers
     from soilml.cli.options import available_effects
     from soilml.cli.tables import (
@@ -79,37 +75,30 @@ def run(args: argparse.Namespace) -> int:
     )
     from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
-    from soilml.traction.report import pull_report
+    from soilml.traction import pull_report
 
-    _check(args)
+    if args.picture is not None and args.by is not None:
+        raise InputError(
+            "--picture draws one soil; select it with --where run=NAME instead of --by"
+        )
     table = read_rows(args, RUNS)
-    options: dict[str, Any] = {
-        "slip_limit": args.slip_limit,
-        "free": parse_names(args.free),
-        "exact_model": args.exact_model,
-    }
     loads = None if args.load is None else parse_numbers("--load", args.load).tolist()
     if len(loads or ()) > MAX_LOADS:
         raise InputError(f"--load names {len(loads or ())} loads; at most {MAX_LOADS}")
-    if loads is not None and min(loads) <= 0.0:
-        raise InputError(f"--load {args.load}: needed is a load above zero")
-    if args.load is None and args.gear is None:
-        whole = read_case(
-            args.model, available_effects(args), with_bias=True, with_explanations=True
-        )
-        if whole.rover is not None:
-            print_table_hints(table, whole)
-            return _run_rover(args, whole, table, options)
-    if args.slope is not None:
-        raise InputError("--slope needs a model file with [rover], and neither --load nor --gear")
-    case = read_case_of_rows(
-        args, args.model, table, available_effects(args), with_explanations=True
-    )
+    effects = available_effects(args)
+    case = read_case(args.model, effects, with_bias=True, with_explanations=True)
+    gravity = gravity_change(args, case)
+    if case.rover is None or args.load is not None or args.gear is not None:
+        case = read_case_of_rows(args, args.model, table, effects, with_explanations=True)
+        case = replace(case, rover=None)  # one of its wheels
     print_table_hints(table, case)
-    options |= {
+    options: dict[str, Any] = {
+        "free": parse_names(args.free),
         "loads": loads,
-        "estimator": _estimator(args),
-        "gravity": gravity_change(args, case),
+        "slopes": None if args.slope is None else np.deg2rad(parse_numbers("--slope", args.slope)),
+        "slip_limit": args.slip_limit,
+        "exact_model": args.exact_model,
+        "gravity": gravity,
     }
     found, failed = result_by_group(
         args, table, "predicting", lambda rows: pull_report(case, rows, **options)
@@ -118,52 +107,9 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _run_rover(args: argparse.Namespace, case: Case, table: Table, options: dict[str, Any]) -> int:
-    """The same for a whole rover."""
-    import numpy as np
-
-    from soilml.cli.option_values import parse_numbers
-    from soilml.cli.tables import result_by_group
-    from soilml.traction.rover_report import rover_report
-
-    slopes = None if args.slope is None else np.deg2rad(parse_numbers("--slope", args.slope))
-    change = gravity_change(args, case)
-    options |= {"slopes": slopes, "estimator": _estimator(args), "gravity": change}
-    found, failed = result_by_group(
-        args, table, "predicting", lambda rows: rover_report(case, rows, **options)
-    )
-    _write_results(args, found, failed)
-    return 0
-
-
-def _estimator(args: argparse.Namespace) -> Estimator | None:
-    """The trained file of --from."""
-    if args.from_ is None:
-        return None
-    from soilml.optional_imports import need
-
-    need("onnxruntime", "pull")
-    from soilml.onboard.estimator import Estimator
-
-    return Estimator.load(args.from_)
-
-
-def _check(args: argparse.Namespace) -> None:
-    if args.picture is not None and args.by is not None:
-        raise InputError(
-            "--picture draws one soil; select it with --where run=NAME instead of --by"
-        )
-    if args.from_ is not None and args.exact_model:
-        raise InputError("--exact-model applies to the rows, not to the file of --from")
-    if args.from_ is not None and args.free is not None:
-        raise InputError(
-            "--free applies to the posterior; the parameters of --from are those of the model file"
-        )
-
-
 def _write_results(
     args: argparse.Namespace,
-    found: Mapping[str, PullReport | RoverReport],
+    found: Mapping[str, PullReport],
     failed: Mapping[str, str],
 ) -> None:
     """Deliver the results.
@@ -171,8 +117,6 @@ def _write_results(
     found: Results by group of --by; one under "" without groups.
     failed: Why other groups have none.
     """
-    from dataclasses import replace
-
     import numpy as np
 
     from soilml.cli.output import deliver

@@ -33,7 +33,7 @@ strides do not show, are uniform over the four soils of the source, unless
 
 On a known soil the same relations give the slip of each stride:
 
-  soilml paper wheel-leg STRIDES.csv --known SSC-2
+  soilml paper wheel-leg STRIDES.csv --known SSC-2 --torque-model empirical
   soilml paper wheel-leg STRIDES.csv --known 35.8,22000   degrees, Pa 1 cm deep
 
 The relations are of one wheel-leg: five legs, Load Testing Feet, 3.75 kg. For
@@ -45,6 +45,8 @@ ARGUMENTS = (
     ("--assume NAME=VALUE,...", "n, cohesion (Pa) or shear_modulus (m) where they are known"),
     ("--wheel R,B,N", "of the heavy rover: m, m and load in N (default: 0.15,0.18,490.5)"),
     ("--known SOIL", "name of table I, or degrees,Pa: give the slip on this soil"),
+    ("--torque-model NAME (simplified)", "with --known: terramechanics, empirical or simplified"),
+    ("--vibration-model NAME (linear)", "with --known: planar or linear"),
     "by",
     "ignore-extra",
     ("--out FILE.csv", "write the table to this file", OutputFile),
@@ -77,7 +79,8 @@ def _slip(args: argparse.Namespace, table: Table) -> int:
         SENSORS[name]: table[name] for name in ("torque_Nm", "vibration_m_s2") if name in table
     }
     columns = {"run": table["run"]} | ({"slip_measured": table["slip"]} if "slip" in table else {})
-    columns |= slip_of_strides(sensors, *_known_soil(args.known))
+    models = {"torque_model": args.torque_model, "vibration_model": args.vibration_model}
+    columns |= slip_of_strides(sensors, *_known_soil(args.known), **models)
     numbered = {**columns, "stride": np.arange(1, len(table) + 1)}
     panel = tuple(name for name in columns if name.startswith("slip") and not name.endswith("_std"))
     write_columns(columns, args.out, args.picture, column_picture(numbered, "stride", [panel]))

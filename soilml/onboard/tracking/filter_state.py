@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from soilml.errors import InputError
-from soilml.onboard.memory import Memory
 from soilml.onboard.set_contract import ABSENT_STD, OPERATING_NOISE, OPTIONAL_READINGS
-from soilml.onboard.state_checksum import state_checksum
 from soilml.onboard.tracking.misfit import ROWS_JUDGED, Rows
-from soilml.onboard.tracking.row_window import LEAST_ROWS, RecentRows, RowWindow, join
+from soilml.onboard.tracking.row_window import LEAST_ROWS, RowWindow
 
 MOST_ROWS = 8  # Rows after which one that disagreed is a glitch
 #: Rows in succession that disagree with those before, after which these are given up even if the
@@ -30,10 +24,6 @@ REPETITIONS = 2
 #: Rows in succession, each with another reading than the row before, after which a slip or load is
 #: known to be a sensor's. A glitch or two in a load that is set are fewer.
 ALIVE_AFTER = 8
-Arrays = dict[str, NDArray[Any]]
-
-FORMAT = 5  # Version of the arrays
-CHECKSUM = "checksum"  # Name of the array that has the checksum of the others
 
 
 @dataclass(frozen=True)
@@ -180,107 +170,3 @@ class FilterState:
             rows_since_change=window.memory.rows,
             variance=self.variance,
         )
-
-    def as_arrays(self, identity: str) -> Arrays:
-        """Everything as arrays of numbers and text, for `numpy.savez`."""
-        window, question, repeated = self.window, self.question, self.repeated
-        numbers = {
-            "length": window.length,
-            "lengths": [len(block.system) for block in window.blocks],
-            "added": window.added,
-            "recent": [{"rows": as_lists(one.rows), "known": one.known} for one in window.recent],
-            "question": [as_lists(row) for row in question.rows],
-            "disagree": question.disagree,
-            "in_succession": question.in_succession,
-            "previous": None if repeated.previous is None else as_lists(repeated.previous),
-            "times": repeated.times,
-            "changes": repeated.changes,
-            "increases": self.increases,
-            "rows_since_change": self.rows_since_change,
-            "rows_since_drift": self.rows_since_drift,
-            "variance": self.variance,
-        }
-        blocks = window.blocks
-        arrays = {
-            "format": np.asarray(FORMAT),
-            "model": np.asarray(identity),
-            "system": np.concatenate([window.memory.system[:0], *(b.system for b in blocks)]),
-            "counts": np.reshape([block.counts for block in blocks], (len(blocks), 3)),
-            "numbers": np.asarray(json.dumps(numbers)),
-        }
-        return arrays | {CHECKSUM: np.asarray(checksum_of(arrays))}
-
-    @staticmethod
-    def from_arrays(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterState:
-        """The state that `as_arrays` wrote for the file of this identity.
-
-        arrays: From `as_arrays`.
-        identity: Of the file.
-        start: A memory of the file without rows.
-        Raises `InputError` for arrays of another file or version, or damaged ones.
-        """
-        try:
-            return _read(arrays, identity, start)
-        except InputError:
-            raise
-        except Exception as error:  # whatever a damaged array raises
-            raise InputError(
-                f"this state of a tracker is damaged ({error}): begin with SoilTracker(estimator)"
-            ) from None
-
-
-def checksum_of(arrays: Mapping[str, Any]) -> int:
-    """The checksum of the other arrays of a state."""
-    names = sorted(name for name in arrays if name != CHECKSUM)
-    return state_checksum(*(part for name in names for part in (name, arrays[name])))
-
-
-def as_lists(row: Rows) -> dict[str, list[float]]:
-    """Rows (m,) by name as lists."""
-    return {name: values.tolist() for name, values in row.items()}
-
-
-def _rows_of(entry: Mapping[str, Any]) -> Rows:
-    """The inverse of `as_lists`."""
-    return {name: np.asarray(values, np.float64) for name, values in entry.items()}
-
-
-def _read(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterState:
-    if int(arrays["format"]) != FORMAT:
-        raise InputError(
-            f"this state of a tracker has format {int(arrays['format'])}; this version of soilml "
-            f"reads format {FORMAT}: begin with SoilTracker(estimator)"
-        )
-    if str(arrays["model"]) != identity:
-        raise InputError(
-            f"this state of a tracker is of {str(arrays['model'])!r}, which is another file, "
-            f"wheel, prior or error of sensors than {identity!r}: begin with SoilTracker(estimator)"
-        )
-    if int(arrays[CHECKSUM]) != checksum_of(arrays):
-        raise ValueError("its checksum does not match")
-    numbers = json.loads(str(arrays["numbers"]))
-    ends = np.cumsum([0, *numbers["lengths"]])
-    system = np.asarray(arrays["system"], dtype=start.system.dtype)
-    if system.shape != (ends[-1], start.system.shape[1]):
-        raise ValueError(f"its system has shape {system.shape}")
-    for part in (system, np.asarray(arrays["counts"], dtype=np.float64)):
-        if not (np.abs(part) < np.finfo(np.float32).max).all():
-            raise ValueError("it has numbers that are not finite, or too large")
-    parts = zip(np.split(system, ends[1:-1]), arrays["counts"], strict=len(ends) > 1)
-    blocks = tuple(
-        replace(start, system=part, counts=np.asarray(count, np.float32)) for part, count in parts
-    )
-    recent = tuple(RecentRows(_rows_of(r["rows"]), int(r["known"])) for r in numbers["recent"])
-    memory = join(blocks) if blocks else start
-    window = RowWindow(blocks, memory, numbers["length"], tuple(numbers["added"]), recent)
-    rows = tuple(_rows_of(row) for row in numbers["question"])
-    previous = None if numbers["previous"] is None else _rows_of(numbers["previous"])
-    return FilterState(
-        window,
-        RowsInQuestion(rows, tuple(numbers["disagree"]), numbers["in_succession"]),
-        RepeatedReadings(previous, tuple(numbers["times"]), tuple(numbers["changes"])),
-        tuple(numbers["increases"]),
-        numbers["rows_since_change"],
-        numbers["rows_since_drift"],
-        numbers["variance"],
-    )

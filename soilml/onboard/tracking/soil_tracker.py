@@ -16,7 +16,7 @@ from soilml.onboard.exact_check import with_exact_check
 from soilml.onboard.features import READABLE, as_number
 from soilml.onboard.memory import Memory
 from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS
-from soilml.onboard.tracking.filter_state import GIVE_UP_AFTER, Arrays, FilterState
+from soilml.onboard.tracking.filter_state import GIVE_UP_AFTER, FilterState
 from soilml.onboard.tracking.misfit import (
     CHANGE_QUANTILE,
     ERROR_DEGREES,
@@ -33,6 +33,7 @@ from soilml.onboard.tracking.misfit import (
     with_noise,
 )
 from soilml.onboard.tracking.row_window import RowWindow
+from soilml.onboard.tracking.state_file import packed_state, unpacked_state
 
 #: After so many rows the last half of the rows is compared with the first, for a slow drift.
 HALVES_EVERY = 4
@@ -178,30 +179,27 @@ class SoilTracker:
         self._begin(FilterState(RowWindow.empty(self._empty, self.length)))
         return self.state
 
-    def save(self) -> Arrays:
-        """All that is remembered as arrays, for `numpy.savez`; see `restore`."""
-        return self._filter.as_arrays(self.estimator.memory_id)
+    def save(self) -> bytes:
+        """All that is remembered; see `restore`, and `write_state` for a file of it."""
+        return packed_state(self._filter, self.estimator.memory_id)
 
     @staticmethod
-    def restore(
-        estimator: Estimator, arrays: Mapping[str, Any], length: int = DEFAULT_LENGTH
-    ) -> SoilTracker:
+    def restore(estimator: Estimator, content: bytes, length: int = DEFAULT_LENGTH) -> SoilTracker:
         """The tracker that `save` wrote, also in another process.
 
-        Raises `InputError` for arrays of another file, wheel, prior or version, or damaged ones.
+        Raises `InputError` for bytes of another file, wheel, prior or version, or damaged ones.
 
         Examples
         --------
-        >>> import numpy as np
         >>> from soilml import Estimator, SoilTracker
         >>> estimator = Estimator.load("exported/wheel.onnx")
-        >>> arrays = SoilTracker(estimator).save()
-        >>> tracker = SoilTracker.restore(estimator, arrays)
+        >>> content = SoilTracker(estimator).save()
+        >>> tracker = SoilTracker.restore(estimator, content)
         >>> tracker.state.rows_remembered
         0
         """
         tracker = SoilTracker(estimator, length)
-        state = FilterState.from_arrays(arrays, estimator.memory_id, tracker._empty)
+        state = unpacked_state(content, estimator.memory_id, tracker._empty)
         if state.window.length != length:
             raise InputError(
                 f"length is {length}, but this state of a tracker has length "

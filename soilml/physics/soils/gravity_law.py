@@ -43,10 +43,6 @@ class GravityLawDraws:
     rise: Floats
     shear_exponent: Floats
 
-    def as_column(self) -> GravityLawDraws:
-        """The draws (n, 1), for arrays of soils along the last axis."""
-        return GravityLawDraws(*(v[:, None] for v in vars(self).values()))
-
 
 @dataclass(frozen=True)
 class GravityChange:
@@ -101,11 +97,6 @@ class GravityChange:
     def ratio(self) -> float:
         """Gravity that is asked for over that of the tests."""
         return self.target / self.tested
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the law is in doubt and matters."""
-        return self.law == "open" and self.ratio != 1.0
 
     def draws(self, count: int, seed: int = 0) -> GravityLawDraws:
         """Equally weighted draws of the law, one in each stratum of each of its quantities."""

@@ -24,15 +24,15 @@ Scatter = Annotated[float, Parameter("1", 1e-4, 3.0, "standard deviation of the 
 class SoilTest(ABC):
     """A quantity of the soil that was measured without a gear."""
 
-    #: Name of the quantity, and its unit.
+    #: Name of the quantity and of the field that has its measured value, and its unit.
     quantity: ClassVar[str]
     unit: ClassVar[str] = "Pa"
     scatter: float
 
     @property
-    @abstractmethod
     def measured(self) -> float:
         """The measured value."""
+        return float(getattr(self, self.quantity))
 
     @abstractmethod
     def predicted(self, soil: Mapping[str, Any]) -> Floats:
@@ -75,11 +75,6 @@ class PlatePressure(SoilTest):
     pressure: Annotated[float, Parameter("Pa", 1.0, 1e9)]
     scatter: Scatter
 
-    @property
-    def measured(self) -> float:
-        """The pressure (Pa)."""
-        return self.pressure
-
     def predicted(self, soil: Mapping[str, Any]) -> Floats:
         """Pressure (Pa) under the plate."""
         modulus = soil["kc"] / self.plate_width + soil["kphi"]
@@ -110,11 +105,6 @@ class ShearStrength(SoilTest):
     normal_stress: Annotated[float, Parameter("Pa", 1.0, 1e9)]
     strength: Annotated[float, Parameter("Pa", 1.0, 1e9)]
     scatter: Scatter
-
-    @property
-    def measured(self) -> float:
-        """The strength (Pa)."""
-        return self.strength
 
     def predicted(self, soil: Mapping[str, Any]) -> Floats:
         """Shear strength (Pa) under the normal stress."""

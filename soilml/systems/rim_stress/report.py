@@ -179,16 +179,13 @@ class ClimbingReport:
 
 def climbing_report(file: RoverFile, data: ClimbData, *, seed: int = 0) -> ClimbingReport:
     """Identify the soil, fit stress against slip, and predict the climbing ability."""
-    front, rear = (StressBySlip.fit(data.of_wheel(wheel)) for wheel in WHEELS)
+    front, rear = (StressBySlip.fit(data.climbed(i) + data.level[i]) for i in range(2))
     ground = identify_ground(
         file.rover, data.climbs, fixed=file.fixed, prior=file.prior, noise=file.noise, seed=seed
     )
     cohesion, friction, _ = ground.shear
     compared = {
-        wheel: compare_stress(
-            [climb.wheels[i] for climb in data.climbs], data.of_wheel(wheel, climbs=False)
-        )
-        for i, wheel in enumerate(WHEELS)
+        wheel: compare_stress(data.climbed(i), data.level[i]) for i, wheel in enumerate(WHEELS)
     }
     return ClimbingReport(
         ground,

@@ -33,19 +33,14 @@ Key = tuple[str, str]  # Run and wheel
 
 @dataclass(frozen=True)
 class ClimbData:
-    """Climbs, and by run and wheel the stresses measured at a known slip, there or elsewhere."""
+    """Climbs, and stresses of front and rear wheels at slips elsewhere, such as level ground."""
 
     climbs: tuple[Climb, ...]
-    stresses: dict[Key, WheelRun]
+    level: tuple[list[WheelRun], list[WheelRun]]
 
-    def of_wheel(self, wheel: str, *, climbs: bool = True) -> list[WheelRun]:
-        """All stresses of the front or the rear wheel; those of climbs only where asked for."""
-        names = {climb.name for climb in self.climbs}
-        return [
-            run
-            for (n, w), run in self.stresses.items()
-            if w == wheel and (climbs or n not in names)
-        ]
+    def climbed(self, i: int) -> list[WheelRun]:
+        """The runs of wheel i of `WHEELS` in the climbs."""
+        return [climb.wheels[i] for climb in self.climbs]
 
 
 def noise_by_scatter(normal: Floats) -> Floats:
@@ -175,7 +170,12 @@ def read_climb_data(
             if (name, wheel) not in found:
                 raise TableError(f"{where}: {what}; both wheels are needed")
         climbs.append(Climb(name, float(slope[0]), *(found[name, wheel] for wheel in WHEELS)))
-    return ClimbData(tuple(climbs), found)
+    names = {climb.name for climb in climbs}
+    front, rear = (
+        [run for (name, w), run in found.items() if w == wheel and name not in names]
+        for wheel in WHEELS
+    )
+    return ClimbData(tuple(climbs), (front, rear))
 
 
 def _slips(driven: Table) -> dict[Key, float]:

@@ -13,6 +13,7 @@ from soilml.systems.tracked_robot.robot import (
 )
 from soilml.systems.tracked_robot.signals import (
     StationaryMean,
+    low_pass,
     rear_sinkage,
     slip_from_displacements,
     stationary_mean,
@@ -21,6 +22,6 @@ from soilml.systems.tracked_robot.track_log import TrackLog, evaluate_log, stead
 
 __all__ = [
     "DiscreteGrousers", "StationaryMean", "TrackLog", "TrackedRobot", "evaluate_log",
-    "grouser_pull", "rear_sinkage", "slip_from_displacements", "stationary_mean", "steady_pulls",
-    "track_balance",
+    "grouser_pull", "low_pass", "rear_sinkage", "slip_from_displacements", "stationary_mean",
+    "steady_pulls", "track_balance",
 ]  # fmt: skip

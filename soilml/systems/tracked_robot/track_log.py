@@ -28,6 +28,7 @@ from soilml.systems.tracked_robot.robot import (
     track_of,
 )
 from soilml.systems.tracked_robot.signals import (
+    low_pass,
     rear_sinkage,
     slip_from_displacements,
     stationary_mean,
@@ -37,7 +38,8 @@ from soilml.systems.tracked_robot.signals import (
 #: payload (N); further ones of the laser distances (m) and the inclination, tail down (rad).
 LOG = ("run", "time_s", "belt_travel_m", "travel_m", "tension_N")
 LASERS = ("front_laser_m", "rear_laser_m", "inclination_rad")
-WINDOWS = 8  # Of the stationary part, whose slips scatter
+#: Cutoff of the low-pass of the lasers, Hz; windows of the stationary part whose slips scatter.
+CUTOFF, WINDOWS = 2.0, 8
 POINTS = 401  # Points along the belt
 #: Columns of each panel of the picture; the last has figure 8 of the source.
 PANELS = (
@@ -164,7 +166,8 @@ def steady_pulls(log: Table, load: float, spacing: float | None = None) -> Table
                 "drawbar_pull_N_std": 0.5 * steady.std_error,
             }
             if with_lasers and spacing is not None:
-                front, rear, angle = (rows[name][part] for name in LASERS)
+                rate = 1.0 / float(np.median(np.diff(rows["time_s"])))
+                front, rear, angle = (low_pass(rows[k], rate, CUTOFF)[part] for k in LASERS)
                 row["rear_sinkage_m"] = float(rear_sinkage(rear, front, angle, spacing).mean())
         except (FitError, InputError) as error:
             raise TableError(f"{log.source}, run {name}: {error}") from None

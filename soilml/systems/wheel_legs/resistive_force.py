@@ -132,23 +132,15 @@ class Section:
         return along, np.sign(bulge) * radius * (np.cos(angle) - np.cos(half))
 
 
-@final
-@dataclass(frozen=True)
-class Foot:
-    """A foot across the end of a leg: a tip in front and a heel behind, or neither."""
-
-    tip: Section | None = None
-    heel: Section | None = None
-
-
-#: Feet by name (Comin and Saaj 2017, table III): Load Testing Foot, Symmetric Rubber Foot, Camel
-#: Inspired Foot. The arc of the LTF is taken as symmetric about its chord, of radius 3.9 cm; in
-#: midstance (`stances.FOOT`) the same print is taken as an arc that leaves the leg level, 14.8 cm.
-FEET: dict[str, Foot] = {
-    "none": Foot(),
-    "LTF": Foot(tip=Section(20, 0.029, 0.04, 0.0055)),
-    "SRF": Foot(tip=Section(10, 0.027, 0.025, 0.0), heel=Section(10, 0.027, 0.025, 0.0)),
-    "CIF": Foot(tip=Section(13, 0.08, 0.065, -0.01), heel=Section(7, 0.05, 0.055, -0.005)),
+#: Feet by name: a tip ahead of the end of a leg and a heel behind it, or neither (Comin and Saaj
+#: 2017, table III): Load Testing Foot, Symmetric Rubber Foot, Camel Inspired Foot. The arc of the
+#: LTF is taken as symmetric about its chord, of radius 3.9 cm; in midstance the same print is taken
+#: as an arc that leaves the leg level, 14.8 cm (`soilml.papers.comin2017_slip.FOOT`).
+FEET: dict[str, tuple[Section | None, Section | None]] = {
+    "none": (None, None),
+    "LTF": (Section(20, 0.029, 0.04, 0.0055), None),
+    "SRF": (Section(10, 0.027, 0.025, 0.0), Section(10, 0.027, 0.025, 0.0)),
+    "CIF": (Section(13, 0.08, 0.065, -0.01), Section(7, 0.05, 0.055, -0.005)),
 }
 
 
@@ -162,7 +154,7 @@ class WheelLeg:
     are assumed; an area of zero omits it.
     """
 
-    foot: Foot = FEET["LTF"]
+    foot: tuple[Section | None, Section | None] = FEET["LTF"]
     legs: int = 5
     mass: Annotated[float, Parameter("kg", 1e-6, 1e6)] = 3.75
     speed: Annotated[float, Parameter("rad/s", 1e-6, 1e3, "forwards")] = 0.3
@@ -176,44 +168,34 @@ class WheelLeg:
         if self.legs not in range(1, MAX_LEGS + 1):
             raise InputError(f"{self.legs} legs; the model is for 1 to {MAX_LEGS}")
 
-    def plates(self) -> Plates:
-        """All segments of all legs, the first leg pointing straight down; the body is last."""
+    def plates(self) -> Array:
+        """Flat segments of all legs, the first of which points straight down, and the body, last.
+
+        Rows (5, plates): centre x and z about the hub (m), area (m^2), tilt from the direction of
+        travel, anticlockwise (rad), and 1 for plates that turn with the wheel, 0 for the body.
+        """
         along, aside = self.leg.outline()
-        parts = [_plates(along, -aside, self.leg.width)]
-        for section, ahead in ((self.foot.tip, 1.0), (self.foot.heel, -1.0)):
+        parts = [_segments(along, -aside, self.leg.width)]
+        for section, ahead in zip(self.foot, (1.0, -1.0), strict=True):
             if section is not None:
                 forward, right = section.outline()
                 down = self.leg.length + ahead * right
-                parts.append(_plates(down, ahead * forward, section.width))
-        down, forward, area, tilt = (np.concatenate(part) for part in zip(*parts, strict=True))
+                parts.append(_segments(down, ahead * forward, section.width))
+        down, forward, area, tilt = np.concatenate(parts, axis=1)
         turn = 2.0 * np.pi * np.arange(self.legs)[:, None] / self.legs
         x = np.sin(turn) * down + np.cos(turn) * forward
         z = np.sin(turn) * forward - np.cos(turn) * down
-        return Plates(
-            x=np.append(x, 0.0),
-            z=np.append(z, -self.clearance),
-            area=np.append(np.tile(area, self.legs), self.body_area),
-            tilt=np.append(turn + tilt, 0.0),
-            turns=np.append(np.ones(x.size), 0.0),
-        )
+        legs = [x, z, np.tile(area, (self.legs, 1)), turn + tilt, np.ones_like(x)]
+        body = [[0.0], [-self.clearance], [self.body_area], [0.0], [0.0]]
+        return np.hstack([np.stack(legs).reshape(5, -1), body])
 
 
-@dataclass(frozen=True)
-class Plates:
-    """Flat segments about the hub: centre (x, z), m, area, m^2, tilt, rad; arrays (plates,)."""
-
-    x: Array
-    z: Array
-    area: Array
-    tilt: Array  # from the direction of travel, anticlockwise
-    turns: Array  # 1 for plates that turn with the wheel, 0 for the body
-
-
-def _plates(down: Array, forward: Array, width: float) -> tuple[Array, Array, Array, Array]:
-    """(down, forward, area, tilt) of the segments between points of a vertical leg."""
+def _segments(down: Array, forward: Array, width: float) -> Array:
+    """(down, forward, area, tilt) of the segments between points of a vertical leg, (4, n)."""
     fall, run = np.diff(down), np.diff(forward)
     middle_down, middle_forward = 0.5 * (down[1:] + down[:-1]), 0.5 * (forward[1:] + forward[:-1])
-    return middle_down, middle_forward, width * np.hypot(fall, run), np.arctan2(-fall, run)
+    area = width * np.hypot(fall, run)
+    return np.stack([middle_down, middle_forward, area, np.arctan2(-fall, run)])
 
 
 def wheel_leg(foot: str = "LTF", **changes: Any) -> WheelLeg:
@@ -223,8 +205,8 @@ def wheel_leg(foot: str = "LTF", **changes: Any) -> WheelLeg:
 
     Examples
     --------
-    >>> wheel_leg("CIF", legs=3).plates().x.shape  # 10 + 13 + 7 segments of each leg, and the body
-    (91,)
+    >>> wheel_leg("CIF", legs=3).plates().shape  # 10 + 13 + 7 segments of each leg, and the body
+    (5, 91)
     """
     if foot not in FEET:
         raise InputError(f"no foot {foot!r}; there are: {', '.join(FEET)}")
@@ -260,20 +242,17 @@ class WalkingLegs:
     def of(wheels: Sequence[WheelLeg], grounds: Sequence[LinearGround], slip: Array) -> WalkingLegs:
         """Stack the plates of all cases, padded with plates of zero area."""
         plates = [wheel.plates() for wheel in wheels]
-        most = max(p.x.size for p in plates)
-
-        def padded(name: str) -> Array:
-            columns = [np.asarray(getattr(p, name), float) for p in plates]
-            return np.stack([np.pad(c, (0, most - c.size)) for c in columns], axis=1)
-
-        tilt = padded("tilt")
+        most = max(own.shape[1] for own in plates)
+        x, z, area, tilt, turns = np.stack(
+            [np.pad(own, ((0, 0), (0, most - own.shape[1]))) for own in plates], axis=-1
+        )
         return WalkingLegs(
-            x=padded("x"),
-            z=padded("z"),
-            area=padded("area"),
+            x=x,
+            z=z,
+            area=area,
             c2=np.cos(2.0 * tilt),
             s2=np.sin(2.0 * tilt),
-            turns=padded("turns"),
+            turns=turns,
             speed=np.array([w.speed for w in wheels], float),
             stiffness=np.array([g.stiffness for g in grounds], float),
             offset=np.array([g.offset for g in grounds], float),

@@ -63,6 +63,20 @@ class LegSoil:
         return np.sqrt(np.diag(self.of_strides + self.deviations @ self.deviations.T))
 
 
+@dataclass(frozen=True)
+class SlipLine:
+    """Slip from a reading x (SI) of a stride, i = a + b x, (a, b) = of_soil (1, phi, sigma_1)."""
+
+    of_soil: Floats  # (2, 3)
+    slip_std: float  # standard error of the slip, table VI
+
+    def line(self, friction_angle: Real, normal_stiffness: Real) -> tuple[Floats, Floats]:
+        """Intercept and slope on a soil of this angle (rad) and stiffness (Pa)."""
+        a, b = (c + p * np.asarray(friction_angle) + q * np.asarray(normal_stiffness)
+                for c, p, q in self.of_soil)  # fmt: skip
+        return a, b
+
+
 @final
 @dataclass(frozen=True, kw_only=True)
 class StrideRelation:
@@ -141,10 +155,16 @@ def _check_pairs(x: Floats, i: Floats) -> None:
 SPRING = np.asarray(
     [[-0.76, 0.03 * DEGREE, 0.35 / STIFFNESS], [-0.2e4, 13.45e4, -0.81 * PRESSURE / 100.0]]
 )
-#: (drop, k_S) = SPRING_OF_SOIL (1, phi, sigma_1), its exact inverse.
-SPRING_OF_SOIL = np.column_stack(
-    [-np.linalg.inv(SPRING[:, 1:]) @ SPRING[:, 0], np.linalg.inv(SPRING[:, 1:])]
-)
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """(2, 3) of x = A (1, y) from that of y = B (1, x), both pairs."""
+    inverse = np.linalg.inv(matrix[:, 1:])
+    return np.column_stack([-inverse @ matrix[:, 0], inverse])
+
+
+#: (drop, k_S) = SPRING_OF_SOIL (1, phi, sigma_1).
+SPRING_OF_SOIL = _inverse(SPRING)
 #: Stiffness (N/m) at which both intercepts of table V are the same; the linear relation assumes it.
 ASSUMED_SPRING = (1.434 - 0.882) / 0.789 * STIFFNESS
 
@@ -184,6 +204,28 @@ VIBRATION = StrideRelation(
     slip_std=0.020**0.5,
     errors=VIBRATION_ERRORS,
 )
+#: By name. Table IV: phi and sigma_1 (N/cm^2) by intercept and slope, columns (1, a, b).
+TORQUE_SLIP: dict[str, SlipLine | StrideRelation] = {
+    "terramechanics": SlipLine(
+        _inverse(np.asarray([[0.661, -0.377, -0.466], [-0.356 * PRESSURE, 0.0, 1.434 * PRESSURE]])),
+        0.074**0.5,
+    ),
+    "empirical": SlipLine(
+        _inverse(np.asarray([[1.0, 0.0, -0.58], PRESSURE * np.asarray([-0.7, 15.997, 20.928])])),
+        0.005**0.5,
+    ),
+    "simplified": TORQUE,
+}
+#: By name. Table V: intercept by drop of friction and stiffness of the spring, slope by the drop.
+VIBRATION_SLIP: dict[str, SlipLine | StrideRelation] = {
+    "planar": SlipLine(
+        np.asarray([[-1.434, 0.0, 0.0], [6.609 / GRAVITY, 0.0, 0.0]])
+        + np.asarray([[0.022 * DEGREE, 0.789 / STIFFNESS], [-0.156 * DEGREE / GRAVITY, 0.0]])
+        @ SPRING_OF_SOIL,
+        0.015**0.5,
+    ),
+    "linear": VIBRATION,
+}
 #: sigma_1 = s_sigma / z and phi = s_I + s_Z z by the midstance sinkage z (m): eq. 29, table VII.
 S_SIGMA, S_I, S_Z = 339.0, 0.76, -7.0
 #: Sinkages (m) that give friction angles between those of the four soils.

@@ -26,7 +26,9 @@ from soilml.systems.wheel_legs.stride_relations import (
     GRAVITY,
     SINKAGE_RANGE,
     TORQUE,
+    TORQUE_SLIP,
     VIBRATION,
+    VIBRATION_SLIP,
     LegSoil,
     soil_of_sinkage,
 )
@@ -272,20 +274,26 @@ def _picture(soils: Mapping[str, StrideSoil]) -> Picture:
 
 
 def slip_of_strides(
-    readings: Mapping[str, Floats], friction_angle: float, normal_stiffness: float
+    readings: Mapping[str, Floats],
+    friction_angle: float,
+    normal_stiffness: float,
+    *,
+    torque_model: str = "simplified",
+    vibration_model: str = "linear",
 ) -> dict[str, Floats]:
     """Slip by the printed relations on a soil of this angle (rad) and stiffness sigma_1 (Pa).
 
     readings: `torque` (N m) and `vibration` (m/s^2) of each stride (n,), or one of them; NaN where
         not measured.
+    torque_model, vibration_model: Names in `TORQUE_SLIP` and `VIBRATION_SLIP`.
 
     Returns: Columns (n,): slip_by_torque, slip_by_vibration and, fused by their variances, slip,
         with standard deviations; NaN where nothing was measured. `in_range` says whether the fused
         slip is one for which the relations were fitted.
 
-    Raises `InputError` where nothing was measured. References: Comin and Saaj 2017, eqs. 18, 24, 26
-    and 28, tables IV to VII. The error of the relations is that of table VI, as for independent
-    errors; on another soil or wheel-leg it is larger.
+    Raises `InputError` for an unknown model, and where nothing was measured. References: Comin and
+    Saaj 2017, eqs. 18, 24, 26 and 28, tables IV to VII. The error of the relations is that of table
+    VI, as for independent errors; on another soil or wheel-leg it is larger.
 
     Examples
     --------
@@ -295,7 +303,11 @@ def slip_of_strides(
     [0.24, 0.1, 0.17, 0.1]
     """
     columns: dict[str, Floats] = {}
-    for name, relation in (("torque", TORQUE), ("vibration", VIBRATION)):
+    asked = (("torque", torque_model, TORQUE_SLIP), ("vibration", vibration_model, VIBRATION_SLIP))
+    for name, model, catalogue in asked:
+        if model not in catalogue:
+            raise InputError(f"no slip model {model!r}; there are: {', '.join(catalogue)}")
+        relation = catalogue[model]
         if name in readings and np.isfinite(value := np.asarray(readings[name], float)).any():
             a, b = relation.line(friction_angle, normal_stiffness)
             columns[f"slip_by_{name}"] = np.asarray(a + b * value)

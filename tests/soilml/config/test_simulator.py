@@ -1,7 +1,6 @@
 """Another program in place of the equations: here soilml's own wheel, as a table of its runs."""
 
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,14 +33,11 @@ sinkage_m = "2 %"
 SIMULATOR = '[simulator]\ntable = "simulated.csv"\nslip = [0.05, 0.6]\nload_N = [30.0, 110.0]\n'
 TRUTH = {"cohesion": 1300.0, "friction_angle": 0.55, "shear_modulus": 0.016}
 INPUTS = ("slip", "load_N", "cohesion_Pa", "friction_angle_rad", "shear_modulus_m")
-#: A simulator as users write one: columns in, columns out.
-RIG = """\
-from soilml import Model, Operating, Wheel, soil
-
 WHEEL = Model(Wheel(radius=0.15, width=0.12))
 
 
-def forces(design):
+def simulate(design):
+    """The wheel's channels for columns of a design."""
     ground = soil(
         "wong1989/dry_sand",
         cohesion=design["cohesion_Pa"],
@@ -49,29 +45,8 @@ def forces(design):
         shear_modulus=design["shear_modulus_m"],
     )
     force = WHEEL(ground, Operating(slip=design["slip"], load=design["load_N"]))
-    return {
-        "torque_Nm": force.torque,
-        "drawbar_pull_N": force.drawbar_pull,
-        "sinkage_m": force.sinkage,
-    }
-"""
-BY_COMMAND = """
-if __name__ == "__main__":
-    import sys
-
-    from soilml.io.read_table import read_table
-    from soilml.io.text_tables import csv_text
-
-    design = read_table(sys.argv[1], ("slip", "load_N")).columns
-    open(sys.argv[2], "w").write(csv_text({**design, **forces(design)}))
-"""
-
-
-def simulate(design):
-    """The wheel's channels for columns of a design."""
-    own: dict = {}
-    exec(RIG, own)
-    return own["forces"](design)
+    channels = {"torque": force.torque, "drawbar_pull": force.drawbar_pull}
+    return {column(n): v for n, v in (channels | {"sinkage": force.sinkage}).items()}
 
 
 @pytest.fixture(scope="module")
@@ -80,14 +55,11 @@ def folder(tmp_path_factory):
     work = tmp_path_factory.mktemp("simulator")
     (work / "front.toml").write_text(MODEL)
     (work / "black_box.toml").write_text(MODEL + SIMULATOR)
-    (work / "rig.py").write_text(RIG + BY_COMMAND)
     case = read_case(work / "black_box.toml", with_simulator=False)
     design = space_filling_runs(case, 120)
     (work / "simulated.csv").write_text(csv_text(design | simulate(design)))
     slip, load = np.tile([0.08, 0.15, 0.25, 0.38, 0.52], 3), np.repeat([40.0, 65.0, 100.0], 5)
-    force = Model(Wheel(radius=0.15, width=0.12))(
-        soil("wong1989/dry_sand", **TRUTH), Operating(slip=slip, load=load)
-    )
+    force = WHEEL(soil("wong1989/dry_sand", **TRUTH), Operating(slip=slip, load=load))
     noise = 1 + 0.02 * np.random.default_rng(4).standard_normal((3, 15))
     channels = (force.torque, force.drawbar_pull, force.sinkage)
     names = ("torque_Nm", "drawbar_pull_N", "sinkage_m")
@@ -153,51 +125,17 @@ def test_outside_the_runs_there_is_no_answer(box):
         box.model.profile(box.soil, Operating(slip=0.2, load=60.0))
 
 
-@pytest.mark.parametrize("how", ["python", pytest.param("command", marks=pytest.mark.slow)])
-def test_design_runs_makes_runs_and_more_where_the_emulator_is_unsure(
-    folder, workplace, capsys, how
-):
-    (workplace / "rig.py").write_text(RIG + BY_COMMAND)
-    own = {"python": 'python = "rig.py:forces"', "command": 'command = "PY rig.py {design} {runs}"'}
-    text = MODEL + SIMULATOR + own[how].replace("PY", sys.executable) + "\n"
-    (workplace / "model.toml").write_text(text)
-    assert main(["design-runs", "model.toml", "--trust", "--count", "40"]) == 0
-    captured = capsys.readouterr()
-    assert "40 runs in" in captured.err and "torque_Nm" in captured.out
-    first = read_table("simulated.csv")
-    assert len(first) == 40 and np.isfinite(first["torque_Nm"]).all()
-    assert main(["design-runs", "model.toml", "--trust", "--count", "10"]) == 0
-    both = read_table("simulated.csv")
-    assert len(both) == 50 and both["slip"][:40].tolist() == first["slip"].tolist()
-    if how == "python":
-        # a design without the runs, and the case that uses them
-        assert main(["design-runs", "model.toml", "--count", "5", "--out", "more.csv"]) == 0
-        assert "torque_Nm" not in Path("more.csv").read_text()
-        assert read_case("model.toml").simulator.error["torque_Nm"] > 0.0
-
-
-@pytest.mark.parametrize(
-    "own",
-    ['python = "rig.py:forces"', """command = 'sh -c "touch it_ran" {design} {runs}'"""],
-    ids=["python", "command"],
-)
-@pytest.mark.parametrize("words", [[], ["--out", "design.csv"]], ids=["printed", "written"])
-def test_a_model_file_runs_no_code_by_itself(workplace, capsys, own, words):
-    (workplace / "rig.py").write_text('from pathlib import Path\n\nPath("it_ran").touch()\n' + RIG)
-    (workplace / "model.toml").write_text(MODEL + SIMULATOR + own + "\n")
-    assert main(["design-runs", "model.toml", "--count", "40", *words]) == 0
-    assert not {"it_ran", "simulated.csv"} & {file.name for file in workplace.iterdir()}
-    said = capsys.readouterr().err
-    assert ("with --trust" in said) == (not words)
-    assert words or "rig.py:forces" in said or "sh -c" in said
-    main(["design-runs", "model.toml", "--count", "40", "--trust"])
-    assert Path("it_ran").exists()
-
-
-def test_trust_needs_code_that_it_trusts(workplace, capsys):
+def test_plan_runs_proposes_runs_and_more_where_the_emulator_is_unsure(workplace, capsys):
     (workplace / "model.toml").write_text(MODEL + SIMULATOR)
-    assert main(["design-runs", "model.toml", "--trust"]) == 2
-    assert "neither python nor command" in capsys.readouterr().err
+    assert main(["plan", "runs", "model.toml", "--count", "40", "--out", "design.csv"]) == 0
+    design = dict(read_table("design.csv", filled=()).columns)
+    assert len(design["slip"]) == 40 and set(design) == set(INPUTS)
+    Path("simulated.csv").write_text(csv_text(design | simulate(design)))
+    capsys.readouterr()
+    assert main(["plan", "runs", "model.toml", "--count", "10", "--out", "more.csv"]) == 0
+    assert "error of the emulator of torque_Nm: " in capsys.readouterr().err
+    assert len(read_table("more.csv", filled=())) == 10
+    assert read_case("model.toml").simulator.error["torque_Nm"] > 0.0
 
 
 def refused(tmp_path, text="", table=None):
@@ -228,32 +166,9 @@ def test_runs_that_cannot_stand_in_for_equations_are_refused(folder, tmp_path):
     assert "does not vary cohesion, which has a prior" in refused(tmp_path, table=fixed)
     blind = {name: columns[name] for name in ("slip", "load_N", "cohesion_Pa")}
     assert "no run has torque_Nm" in refused(tmp_path, table=blind)
-    both = SIMULATOR + 'python = "a.py:f"\ncommand = "x {design} {runs}"\n'
-    assert "needed is one of them" in refused(tmp_path, both)
-    assert "it must contain {design}" in refused(tmp_path, SIMULATOR + 'command = "x"\n')
-    assert "FILE.py:FUNCTION" in refused(tmp_path, SIMULATOR + 'python = "forces"\n')
-    assert "slip must lie between -1 and 1" in refused(tmp_path, SIMULATOR.replace("0.6]", "1.6]"))
-
-
-@pytest.mark.parametrize(
-    ("body", "said"),
-    [
-        ("raise RuntimeError('no licence')", "the simulator failed: RuntimeError: no licence"),
-        ("return {'torque_Nm': 0.0 * design['slip'] + float('nan')}", "gave no number for torque"),
-        ("return {'force': design['slip']}", "gave force; needed is torque_Nm"),
-        ("return {'torque_Nm': [1.0]}", "gave 1 values of torque_Nm for 40 runs"),
-        ("return 3.0", "forces gave a float; needed is a dict"),
-        ("import random; return {'torque_Nm': [random.random() for _ in design['slip']]}",
-         "for the same run; fix its seed"),
-    ],
-)  # fmt: skip
-def test_simulators_that_fail_are_one_line(workplace, capsys, body, said):
-    (workplace / "rig.py").write_text(f"def forces(design):\n    {body}\n")
-    (workplace / "model.toml").write_text(MODEL + SIMULATOR + 'python = "rig.py:forces"\n')
-    assert main(["design-runs", "model.toml", "--trust", "--count", "40"]) == 2
-    captured = capsys.readouterr()
-    assert said in captured.err and captured.err.count("\n") == 1
-    assert not (workplace / "simulated.csv").exists()
+    assert "[lowest, highest], between -1 and 1" in refused(
+        tmp_path, SIMULATOR.replace("0.6]", "1.6]")
+    )
 
 
 def test_rows_outside_the_runs_are_refused(folder, tmp_path, capsys):

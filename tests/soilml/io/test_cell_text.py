@@ -67,7 +67,7 @@ def test_options(text, tmp_path, capsys):
         ["simulate", model, "--slip", "0.1", "--load", "60", "--speed", text],
         ["gap", model, runs, "--out", str(tmp_path / "o"), "--checked", f"torque-offset={text}"],
         ["gap", model, runs, "--out", str(tmp_path / "o"), "--seed", text],
-        ["advise", model, "--count", text],
+        ["plan", "next", model, "--count", text],
         ["generate", "wheel", str(tmp_path / "o.parquet"), "--rows", text],
         ["generate", "wheel", str(tmp_path / "o.parquet"), "--workers", text],
     ):

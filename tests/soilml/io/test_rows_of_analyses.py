@@ -10,7 +10,7 @@ from soilml.gap import audit, gap
 from soilml.identification.bevameter import bevameter
 from soilml.io.read_table import as_table
 from soilml.numerics.prior import Prior
-from soilml.traction.report import pull_report
+from soilml.traction import pull_report
 
 SLIP, LOAD = np.tile([0.1, 0.2, 0.35, 0.5], 3), np.repeat([40.0, 60.0, 90.0], 4)
 CASE = Case(

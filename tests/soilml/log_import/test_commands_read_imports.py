@@ -86,7 +86,7 @@ def test_identify_and_estimate_read_what_import_wrote(kind, tmp_path):
     assert main(["identify", model, out, "--method", "nonlinear"]) == 0
     text = MODEL.replace("[soil.prior]\n", PRIORS)
     (tmp_path / "model.toml").write_text(text)
-    assert main(["estimate", "exported/any_wheel.onnx", out, "--case", model, "--by", "run"]) == 0
+    assert main(["estimate", "exported/any_wheel.onnx", out, "--model", model, "--by", "run"]) == 0
 
 
 def test_several_wheels_of_a_log_over_time_are_read(tmp_path):

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from simulated_rig import LOAD, RADIUS, RADIUS_EDIT, drive, imported, torque_law, write_csv
 
-from soilml.cli import main
 from soilml.errors import InputError
-from soilml.io.text_tables import csv_text
 from soilml.log_import import init_map
 from soilml.log_import.checks.table_hints import table_hints
 from soilml.remarks import about, texts
@@ -70,22 +68,6 @@ def test_a_load_that_each_log_states_for_itself(tmp_path):
     found, text = imported(tmp_path, logs)
     assert "head = " in text and "value" not in text.split("[load]")[1].split("[")[0]
     assert found.table["load_N"].tolist() == [50.0, 90.0]
-
-
-@pytest.mark.slow
-def test_the_table_of_an_earlier_import_is_no_log(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    d = drive(np.random.default_rng(92), slips=(0.3,), seconds=8)
-    write_csv(tmp_path / "a.csv", {"t": d.time, "w": d.rim / RADIUS, "v": d.ground,
-                                   "torque": d.torque, "Fz": d.load})  # fmt: skip
-    (tmp_path / "map.toml").write_text(init_map("a.csv").replace("# radius", "radius"))
-    for _ in range(2):
-        assert main(["import", *sorted(p.name for p in tmp_path.glob("*.csv")),
-                     "--map", "map.toml", "--out", "runs.csv"]) == 0  # fmt: skip
-    assert "runs.csv is a table of runs and no log" in capsys.readouterr().err
-    (tmp_path / "b.csv").write_text(csv_text({"t": d.time, "v": d.ground}))
-    assert main(["import", "a.csv", "b.csv", "--map", "map.toml", "--out", "b.csv"]) == 2
-    assert "b.csv is an input and would be overwritten" in capsys.readouterr().err
 
 
 def test_a_run_without_data_is_one_line(tmp_path):

@@ -121,7 +121,7 @@ STRENGTHS = {
 def test_strengths_alone_give_cohesion_and_friction(lines, tmp_path, capsys):
     path, out = written(tmp_path, "\n".join(lines)), tmp_path / "soil.json"
     picture = tmp_path / "s.png"
-    words = ["bevameter", str(path), "--json", str(out), "--picture", str(picture)]
+    words = ["bevameter", str(path), "--out", str(out), "--picture", str(picture)]
     assert main(words) == 0
     assert main(["bevameter", str(path), "--out", str(tmp_path / "soil.toml")]) == 0
     found = json.loads(out.read_text())
@@ -151,7 +151,7 @@ def test_a_bad_table_does_not_take_the_others_along(tmp_path, capsys):
     good = written(tmp_path, "\n".join(STRENGTHS["a yield locus"]))
     bad, out = tmp_path / "plates.csv", tmp_path / "soil.json"
     bad.write_text("test,sinkage_m\na,0.01\n")
-    assert main(["bevameter", str(bad), str(good), "--json", str(out)]) == 0
+    assert main(["bevameter", str(bad), str(good), "--out", str(out)]) == 0
     found = json.loads(out.read_text())
     (remark,) = [r for r in found["remarks"] if r["code"] == "table-left-out"]
     assert remark["about"] == [str(bad)] and "cohesion" in found["soil"]
@@ -159,7 +159,7 @@ def test_a_bad_table_does_not_take_the_others_along(tmp_path, capsys):
     # tables of a kind are taken together, and tests of one name in two of them are two
     other = tmp_path / "more.csv"
     other.write_text(good.read_text())
-    assert main(["bevameter", str(good), str(other), "--json", str(out)]) == 0
+    assert main(["bevameter", str(good), str(other), "--out", str(out)]) == 0
     assert len({t["test"] for t in json.loads(out.read_text())["shear_tests"]}) == 6
     assert main(["bevameter", str(good), str(good)]) == 2
     assert "given twice" in capsys.readouterr().err
@@ -207,7 +207,7 @@ SHEAR = {
 @pytest.mark.parametrize("lines", SHEAR.values(), ids=SHEAR)
 def test_shear_and_triaxial_tests_of_strangers(lines, tmp_path):
     path, out = written(tmp_path, "\n".join(lines)), tmp_path / "soil.json"
-    assert main(["bevameter", str(path), "--json", str(out)]) == 0
+    assert main(["bevameter", str(path), "--out", str(out)]) == 0
     found = {k: e["value"] for k, e in json.loads(out.read_text())["estimates"].items()}
     assert found["cohesion"] == pytest.approx(1500.0, rel=0.02)
     assert found["friction_angle"] == pytest.approx(np.radians(33), rel=0.01)
@@ -231,7 +231,7 @@ def test_plate_tests_of_strangers(header, shape, tmp_path):
         for k, b in enumerate((30, 60, 90)) for z in (4, 8, 16, 30)
     ]  # fmt: skip
     path, out = written(tmp_path, "\n".join([header, *rows])), tmp_path / "soil.json"
-    assert main(["bevameter", str(path), "--json", str(out)]) == 0
+    assert main(["bevameter", str(path), "--out", str(out)]) == 0
     found = json.loads(out.read_text())
     assert found["estimates"]["n"]["value"] == pytest.approx(1.1, rel=1e-3)
     assert len(found["plate_tests"]) == 3
@@ -241,7 +241,7 @@ def test_one_plate_of_a_simulation_states_its_size_in_the_head(tmp_path):
     rows = [f"{i},{i / 100},{i / 1000},{900 * (i / 1000) ** 1.1:.6f}" for i in range(1, 40)]
     lines = ["# plate radius: 50 mm", "step,time [s],z [m],Fz [N]", *rows]
     out = tmp_path / "soil.json"
-    assert main(["bevameter", str(written(tmp_path, "\n".join(lines))), "--json", str(out)]) == 0
+    assert main(["bevameter", str(written(tmp_path, "\n".join(lines))), "--out", str(out)]) == 0
     assert json.loads(out.read_text())["estimates"]["n"]["value"] == pytest.approx(1.1, rel=1e-3)
 
 

@@ -39,17 +39,13 @@ def estimator(request):
 @pytest.mark.parametrize("name", ["torque in lbf ft", "torque halved"])
 def test_faults_that_the_answer_explains_are_detected(estimator, name):
     found = [estimator.run(**rows) for rows in sets_of_rows(20, 5, FAULTS[name])]
-    assert all(e.disagrees and e.exact_probability < 0.01 for e in found)
+    assert all(e.disagrees for e in found)
     assert np.mean([e.in_range for e in found]) > 0.4  # errors of the model explain them
 
 
-def test_few_sound_sets_are_flagged_and_the_probability_says_how_few(estimator):
+def test_few_sound_sets_are_flagged(estimator):
     found = [estimator.run(**rows) for rows in sets_of_rows(200, 6)]
-    probability = np.asarray([e.exact_probability for e in found])
-    disagrees = np.asarray([bool(e.disagrees) for e in found])
-    assert disagrees.sum() <= 6
-    assert np.array_equal(disagrees, probability < 0.01)
-    assert np.mean(probability < 0.3) <= 0.3 and np.median(probability) > 0.3
+    assert sum(bool(e.disagrees) for e in found) <= 6
 
 
 def test_it_is_the_misfit_of_the_same_rows_with_an_exact_model(estimator):
@@ -77,7 +73,7 @@ def test_sensors_that_are_declared_exact_are_checked_as_exact(estimator):
 
 def test_rows_that_tell_nothing_are_not_flagged(estimator):
     outside = estimator.run(slip=[0.9, 0.95], torque=[1.0, 1.1], load=[60.0, 60.0])
-    assert not outside.disagrees and np.isnan(outside.exact_probability)
+    assert not outside.disagrees
     single = estimator(slip=0.3, torque=2.1, load=60.0)
     assert not single.disagrees and np.isnan(single.exact_misfit)
 

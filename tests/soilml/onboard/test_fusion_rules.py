@@ -25,12 +25,6 @@ def test_published_slip_weights(torque, vibration, weight):
         assert rule(np.zeros(2), std).weights[0] == pytest.approx(weight, abs=0.016)
 
 
-def test_pairwise_rule_of_three_is_the_printed_one():
-    t, v, s = np.asarray([0.3, 0.5, 0.2]) ** 2
-    expected = (v / (v + t) + s / (s + t)) / 3.0
-    assert pairwise(np.zeros(3), np.asarray([0.3, 0.5, 0.2])).weights[0] == pytest.approx(expected)
-
-
 def test_best_linear_is_the_constrained_optimum():
     rng = np.random.default_rng(2)
     for _ in range(20):

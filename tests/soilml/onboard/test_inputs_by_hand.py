@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from made_estimates import made_estimate
 
-from soilml.onboard.estimate import PriorSummary, Reason
-from soilml.onboard.multi_sensor import fuse_estimates
+from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.set_contract import (
     ABSENT_READING,
     ABSENT_STD,
@@ -90,24 +89,6 @@ PRIOR = PriorSummary(*np.asarray([[1.0, 10.0], [0.5, 4.0], [0.0, 2.0], [2.0, 18.
 
 def estimates(mean, std, in_range):
     return made_estimate(mean, std, PRIOR, in_range, ("a", "b"), ("1", "1"), factor=1.0)
-
-
-def test_fused_rows_keep_shape_ends_and_reasons():
-    """One file alone in a row keeps its interval; none gives the prior; two are fused."""
-    first = estimates([[[1.0, 9.0], [1.5, 9.0]]], [[[0.1, 1.0]] * 2], [[True, False]])
-    second = estimates([[[1.2, 9.0], [1.5, 9.0]]], [[[0.1, 1.0]] * 2], [[False, False]])
-    found = fuse_estimates([first, second], "prior-once")
-    assert found.estimate.mean.shape == (1, 2, 2)
-    assert found.estimate.low[0, 0] == pytest.approx([0.9, 8.0])
-    assert found.estimate.high[0, 0] == pytest.approx([1.1, 10.0])
-    assert found.estimate.mean[0, 1] == pytest.approx(PRIOR.mean)
-    assert found.estimate.std[0, 1] == pytest.approx(PRIOR.std)
-    assert found.estimate.low[0, 1] == pytest.approx(PRIOR.mean - 1.6448536 * PRIOR.std)
-    assert found.used.tolist() == [[[True, False]], [[False, False]]]
-    assert found.estimate.reason.tolist() == [[Reason.ESTIMATED, Reason.OUT_OF_RANGE]]
-    apart = estimates([[[1.9, 9.0], [1.5, 9.0]]], [[[0.1, 1.0]] * 2], [[True, False]])
-    found = fuse_estimates([first, apart], "prior-once")
-    assert found.estimate.reason[0, 0] == Reason.CONTRADICTORY and not found.used.any()
 
 
 def test_a_mean_within_one_and_a_half_standard_deviations_of_an_end_is_at_the_edge():

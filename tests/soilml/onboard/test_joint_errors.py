@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from made_estimates import made_estimate
 
+from soilml.errors import InputError
 from soilml.onboard.estimate import PriorSummary, Reason
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.joint_errors import joint_errors
@@ -86,28 +87,16 @@ def test_fused_estimates_are_calibrated_whatever_the_correlation(common):
     truth, mean, std = sensors.draw(20000)
     each = [estimate(mean[i, 0], std[i, 0], files[i]) for i in range(2)]
     fused = fuse_estimates(each)
-    assert fused.rule == "correlated"
     assert rmse(fused.estimate, truth) < 1.002 * min(rmse(e, truth) for e in each)
     assert cover(fused.estimate, truth) == pytest.approx(0.9, abs=0.015)
     assert z_rms(fused.estimate, truth) == pytest.approx(1.0, abs=0.04)
     assert np.mean(fused.disagreement**2) == pytest.approx(1.0, abs=0.1)
-    if common > 0.3:  # taken for independent they are too certain
-        assert cover(fuse_estimates(each, "inverse-variance").estimate, truth) < 0.87
 
 
-@pytest.mark.parametrize("count", [2, 4, 8, 16])
-def test_repeated_readings_share_the_error_of_the_soil(count):
-    sensors = Sensors(soil=0.8)
-    file = sensors.files()[0]
-    assert file.common_share()[0] == pytest.approx(0.8, abs=1e-3)
-    truth, mean, std = sensors.draw(20000, count)
-    each = [estimate(mean[0, k], std[0, k], file) for k in range(count)]
-    fused = fuse_estimates(each).estimate
-    assert rmse(fused, truth) < rmse(each[0], truth)
-    # between the measured numbers, 1 and 8, it is interpolated; beyond them it is constant
-    assert cover(fused, truth) == pytest.approx(0.9, abs=0.015)
-    assert z_rms(fused, truth) == pytest.approx(1.0, abs=0.05)
-    assert cover(fuse_estimates(each, "prior-once").estimate, truth) < 0.82
+def test_two_estimates_of_one_file_are_refused():
+    file = Sensors().files()[0]
+    with pytest.raises(InputError, match="give one of each file"):
+        fuse_estimates([estimate([0.3], 0.05, file), estimate([0.31], 0.05, file)])
 
 
 def test_readings_that_disagree_widen_the_estimate_and_contradict_beyond_four_deviations():
@@ -125,3 +114,21 @@ def test_readings_that_disagree_widen_the_estimate_and_contradict_beyond_four_de
     assert not answer.in_range[0] and answer.reason[0] == Reason.CONTRADICTORY
     np.testing.assert_array_equal(answer.mean[0], answer.prior.mean)
     assert not contradictory.used.any()
+
+
+def test_fused_rows_keep_shape_ends_and_reasons():
+    """One file alone in a row keeps its interval; none gives the prior."""
+    files = Sensors().files()
+    one, other = (
+        made_estimate([[[m], [0.4]]], 0.1, PRIOR, [[first, False]], factor=1.0, errors=file)
+        for m, first, file in ((0.3, True, files[0]), (0.4, False, files[1]))
+    )
+    found = fuse_estimates([one, other])
+    assert found.estimate.mean.shape == (1, 2, 1)
+    assert found.estimate.low[0, 0] == pytest.approx([0.2])
+    assert found.estimate.high[0, 0] == pytest.approx([0.4])
+    assert found.estimate.mean[0, 1] == pytest.approx(PRIOR.mean)
+    assert found.estimate.std[0, 1] == pytest.approx(PRIOR.std)
+    assert found.estimate.low[0, 1] == pytest.approx(PRIOR.mean - 1.6448536 * PRIOR.std)
+    assert found.used.tolist() == [[[True, False]], [[False, False]]]
+    assert found.estimate.reason.tolist() == [[Reason.ESTIMATED, Reason.OUT_OF_RANGE]]

@@ -35,19 +35,20 @@ DECLARING = {
 }
 
 
-@pytest.mark.parametrize("row", PUBLISHED, ids=lambda row: f"{row['class']}.{row['field']}")
-def test_a_parameter_is_accepted_up_to_its_bounds_and_no_further(row):
-    node, field = DECLARING[row["class"], row["field"]], row["field"]
-    for end, outwards in (("lower", -np.inf), ("upper", np.inf)):
-        bound = float(row[end])
-        check(_with(node, field, bound))
-        with pytest.raises(InputError, match=f"{field} is .*"):
-            check(_with(node, field, float(np.nextafter(bound, outwards))))
-    default = next(f for f in fields(type(node)) if f.name == field).default
-    assert default is None or isinstance(default, float) == bool(row["default"])
-    assert declared(type(node))[field].unit == row["unit"]
-    if row["default"]:
-        assert default == float(row["default"])
+def test_a_parameter_is_accepted_up_to_its_bounds_and_no_further(subtests):
+    for row in PUBLISHED:
+        node, field = DECLARING[row["class"], row["field"]], row["field"]
+        with subtests.test(f"{row['class']}.{field}"):
+            for end, outwards in (("lower", -np.inf), ("upper", np.inf)):
+                bound = float(row[end])
+                check(_with(node, field, bound))
+                with pytest.raises(InputError, match=f"{field} is .*"):
+                    check(_with(node, field, float(np.nextafter(bound, outwards))))
+            default = next(f for f in fields(type(node)) if f.name == field).default
+            assert default is None or isinstance(default, float) == bool(row["default"])
+            assert declared(type(node))[field].unit == row["unit"]
+            if row["default"]:
+                assert default == float(row["default"])
 
 
 def _with(node, field, value):

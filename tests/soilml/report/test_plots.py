@@ -9,7 +9,7 @@ from conftest import MODEL
 from soilml import Estimator, Table, identify, read_case
 from soilml.errors import InputError
 from soilml.gap.results import GapReduction, GapReport
-from soilml.traction.report import pull_report
+from soilml.traction import pull_report
 
 matplotlib = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")
@@ -45,13 +45,11 @@ def gap(case):
 
 
 def pull(case):
-    return pull_report(case, Table(dict(ROWS)), loads=[60.0], slip_limit=0.4)
+    return pull_report(case, Table(dict(ROWS)), loads=[60.0], slip_limit=0.4, exact_model=True)
 
 
 def rover(case):
-    from soilml.traction.rover_report import rover_report
-
-    return rover_report(read_case(ROVER), Table(dict(ROWS)), slopes=np.asarray([0.0, 0.1]))
+    return pull_report(read_case(ROVER), Table(dict(ROWS)), slopes=np.asarray([0.0, 0.1]))
 
 
 def imported(case):

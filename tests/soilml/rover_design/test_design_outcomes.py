@@ -14,7 +14,7 @@ from soilml.rover_design.study import read_study
 from soilml.rover_design.uncertainty import possible_tests, variance_shares
 from soilml.rover_design.worlds import draw_worlds
 from soilml.traction.draws import SoilDraws
-from soilml.traction.rover_performance import rover_performance
+from soilml.traction.vehicle import DrivenVehicle, performance
 
 SPREAD = "\n[soil.prior]\nfriction_angle = [0.5, 0.7]\nshear_modulus = [0.008, 0.02]\n\n[goal]"
 
@@ -58,8 +58,8 @@ def test_a_design_does_what_pull_says_of_the_same_rover(study, lug):
     draws = SoilDraws(names, np.stack([worlds.soil[n] for n in names], axis=1))
     case = Case(model, soil("ding2015/hit_lss1"), rover=rover)
     slope = np.asarray([study.goal.slope])
-    known = rover_performance(case, draws, slope, 0.6 * shares)
-    # `rover_performance` has more slips below the first one, where nothing is needed here
+    known = performance(DrivenVehicle.of_rover(case), draws, slope, 0.6 * shares)
+    # `performance` has more slips below the first one, where nothing is needed here
     assert found.margin[0] == pytest.approx(known.margin[:, 0], rel=1e-6, abs=1e-6)
     needed = found.slip[0] > 0.06
     assert needed.sum() > 10

@@ -1,4 +1,4 @@
-"""Sweep, optimisation, front and the best design."""
+"""Rounds of designs, the front, and the best design."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from design_files import STUDY
 
 from soilml import design
 from soilml.rover_design.search import Designs, best_design, meets, pareto_front
-from soilml.rover_design.study import read_study
+from soilml.rover_design.study import Dimension, read_study
 
 
 @pytest.fixture
@@ -49,18 +49,26 @@ def test_the_best_design_is_the_least_one_that_meets_the_goal(study):
 
 
 @pytest.mark.slow
-def test_optimisation_finds_a_smaller_wheel_than_a_coarse_sweep(study):
+def test_later_rounds_find_a_smaller_wheel_than_the_first(study):
     study = replace(study, goal=replace(study.goal, slope=0.05, risk=0.2))
-    coarse = design(study, designs=8, draws=40, optimise=False)
-    fine = design(study, designs=8, draws=40)
-    assert meets(study, coarse.designs).any()
-    width = fine.best_dimensions["width"]
-    assert width <= coarse.best_dimensions["width"]
-    found = fine.designs
-    least = found.dimensions["width"][meets(study, found)].min()
-    assert width == least
-    assert fine.as_json()["best"]["width"] == width
+    found = design(study, designs=8, draws=40)
+    designs = found.designs
+    first = Designs(*({k: v[:8] for k, v in own.items()} for own in
+                      (designs.dimensions, designs.results)))  # fmt: skip
+    assert meets(study, first).any()
+    width = found.best_dimensions["width"]
+    assert width < first.dimensions["width"][meets(study, first)].min()
+    assert width == designs.dimensions["width"][meets(study, designs)].min()
+    assert found.as_json()["best"]["width"] == width
     # on the limit: a slightly narrower wheel of the same lugs does not meet it
-    same = found.dimensions["lug_height"] == fine.best_dimensions["lug_height"]
-    narrower = same & (found.dimensions["width"] < width - 1e-9)
-    assert not meets(study, found)[narrower].any()
+    same = designs.dimensions["lug_height"] == found.best_dimensions["lug_height"]
+    narrower = same & (designs.dimensions["width"] < width - 1e-9)
+    assert not meets(study, designs)[narrower].any()
+
+
+def test_listed_sizes_are_each_tried_once(study):
+    sizes = {"width": Dimension((0.05, 0.08)), "lug_height": Dimension((0.0, 0.01))}
+    study = replace(study, dimensions={**study.dimensions, **sizes})
+    found = design(study, designs=32, draws=20).designs
+    tried = set(zip(found.dimensions["width"], found.dimensions["lug_height"], strict=True))
+    assert found.count == len(tried) == 4

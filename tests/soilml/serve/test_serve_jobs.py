@@ -88,22 +88,3 @@ def test_a_raw_log_is_guessed_corrected_and_imported(page, tmp_path):
     assert b"<h1" in written(page, job, "runs.report.html?show=1")[1]
     again = page.job(kind="look", files=[f"{job['id']}/runs.csv"])["result"]
     assert again["kind"] == "runs" and again["rows"] == 4
-
-
-@pytest.fixture
-def question(page):
-    """The first question of the page about wheels."""
-    return json.loads(page.request("GET", "/api/choices")[2])["question"]
-
-
-@pytest.mark.parametrize("change", [("mass = 12.0", "mass = -1"), ("[rover]", "[rover")])
-def test_a_wrong_question_about_wheels_is_one_line(page, question, change):
-    job = page.job(kind="wheels", files=[], question=question.replace(*change))
-    assert job["state"] == "failed" and "rover.toml" in job["error"]
-
-
-@pytest.mark.long
-def test_wheels_are_compared(page, question):
-    job = page.job(kind="wheels", files=[], question=question, effort="quick")
-    assert job["state"] == "done", job["error"]
-    assert {"report.html", "report.json"} <= set(job["result"]["files"])

@@ -14,7 +14,7 @@ from soilml.io.text_tables import csv_text
 from soilml.physics.effects import StressShift
 from soilml.soil_maps.field import FieldSetting, SoilField, map_ability
 from soilml.soil_maps.local_soils import LocalSoils
-from soilml.soil_maps.raster import MapGrid, geotiff, nav2_files, read_elevation
+from soilml.soil_maps.raster import MapGrid, geotiff, nav2_files
 
 tifffile = pytest.importorskip("tifffile")
 
@@ -76,17 +76,7 @@ def estimator():
 
 
 @pytest.fixture(scope="module")
-def dem(tmp_path_factory):
-    """Ground that rises by 10 degrees to the east."""
-    grid = MapGrid(-10.0, -10.0, 1.0, (20, 70))
-    x = grid.centres[:, 0].reshape(grid.shape)
-    file = tmp_path_factory.mktemp("dem") / "dem.tif"
-    file.write_bytes(geotiff(grid, {"height_m": np.tan(np.deg2rad(10.0)) * x}))
-    return file
-
-
-@pytest.fixture(scope="module")
-def found(rover, estimator, dem):
+def found(rover, estimator):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("soilml.soil_maps.field.DRAWS", 400)
         return soil_map(
@@ -95,7 +85,6 @@ def found(rover, estimator, dem):
             estimator,
             cell=1.0,
             slopes=np.deg2rad([0.0, 15.0]),
-            elevation=read_elevation(str(dem)),
         )
 
 
@@ -189,14 +178,6 @@ def test_a_geotiff_lies_where_its_cells_are(tmp_path):
     assert np.array_equal(data[0], values[::-1].astype(np.float32), equal_nan=True)
     assert tags[33550][:2] == (0.5, 0.5) and tags[33922][3:5] == (-1.0, 3.0)
     assert tags[34735][-4:] == (3072, 0, 1, 32633) and "two &amp; more" in tags[42112]
-    file.write_bytes(geotiff(grid, {"one": values}))
-    heights = read_elevation(str(file))
-    inner = grid.centres[grid.centres[:, 0] > -0.5]
-    expected = values.ravel()[grid.centres[:, 0] > -0.5]
-    assert heights.at(inner) == pytest.approx(expected)
-    middle = 0.5 * (inner[14] + inner[15])
-    assert heights.at(middle) == pytest.approx(0.5 * (expected[14] + expected[15]))
-    assert np.isnan(heights.at(np.asarray([99.0, 0.0])))
 
 
 def test_nav2_reads_the_probability_of_not_climbing():
@@ -210,7 +191,7 @@ def test_nav2_reads_the_probability_of_not_climbing():
     assert lines["origin"] == "[-1.5, 2.0, 0.0]" and lines["resolution"] == "0.5"
 
 
-def test_other_bad_input_is_one_line(rover, estimator, tmp_path, dem):
+def test_other_bad_input_is_one_line(rover, estimator):
     case = read_case(rover)
     with pytest.raises(InputError, match=r"would have .* cells of 0.01 m"):
         soil_map(case, two_soils(), estimator, cell=0.01, reach=1000.0)
@@ -226,18 +207,12 @@ def test_other_bad_input_is_one_line(rover, estimator, tmp_path, dem):
         soil_map(case, two_soils(60), estimator, cell=100.0)
     with pytest.raises(InputError, match="has no set posterior"):
         soil_map(case, two_soils(), Estimator.load("wheel_lssvm"))
-    (tmp_path / "dem.tif").write_text("no picture")
-    with pytest.raises(InputError, match="cannot be read as GeoTIFF"):
-        read_elevation(str(tmp_path / "dem.tif"))
-    far = replace(read_elevation(str(dem)), west=5000.0)
-    with pytest.raises(InputError, match="does not cover the drive"):
-        soil_map(case, two_soils(60), estimator, elevation=far, score=False)
 
 
 def test_the_command_writes_its_folder(rover, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "drive.csv").write_text(csv_text(two_soils(60)))
-    words = ["map", str(rover), "drive.csv", "--from", "wheel", "--cell", "2"]
+    words = ["drive", "map", str(rover), "drive.csv", "--from", "wheel", "--cell", "2"]
     monkeypatch.setattr("soilml.soil_maps.field.DRAWS", 100)
     assert main([*words, "--slope", "0,10", "--out", "map"]) == 0
     said = capsys.readouterr().out
@@ -248,7 +223,7 @@ def test_the_command_writes_its_folder(rover, tmp_path, capsys, monkeypatch):
     assert content["cells"] > 0 and len(content["stretches"]["station_m"]) >= 4
     assert "no-score" in {remark["code"] for remark in content["remarks"]}
     for missing in (["none.toml"], [str(rover), "--from", "none.onnx"]):
-        assert main(["map", missing[0], "drive.csv", *missing[1:]]) == 2
+        assert main(["drive", "map", missing[0], "drive.csv", *missing[1:]]) == 2
         assert capsys.readouterr().err.count("\n") == 1
     text = (tmp_path / "drive.csv").read_text().replace("x_m", "east_m")
     (tmp_path / "drive.csv").write_text(text)

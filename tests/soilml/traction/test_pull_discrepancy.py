@@ -8,7 +8,7 @@ from measured_rows import torque_rows
 
 from soilml import read_case
 from soilml.config.measurement_noise import Discrepancy, Noise
-from soilml.traction import predict_traction
+from soilml.traction import DrivenVehicle, performance
 from soilml.traction.soil_draws import measured_soil
 
 SOIL = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
@@ -39,9 +39,13 @@ def std_at(draws, load):
     return error.std()
 
 
+def pulled(case, draws):
+    return performance(DrivenVehicle.of_wheel(case, 60.0), draws, np.zeros(0), SLIP)
+
+
 def test_measured_pulls_tell_the_error_near_them_and_not_far_away(case):
     draws, before, pull = drawn(case, with_pull=True)
-    near = predict_traction(case, draws, 60.0, SLIP).pull
+    near = pulled(case, draws).pull
     np.testing.assert_allclose(near.mean(axis=0), pull + ERROR, atol=0.02)
     assert (near.std(axis=0) < 0.03).all()
     assert std_at(draws, 2000.0) == pytest.approx(STATED, rel=0.12)
@@ -51,9 +55,10 @@ def test_measured_pulls_tell_the_error_near_them_and_not_far_away(case):
 
 def test_the_error_widens_the_bands_of_pull_and_slope(case):
     draws, _, _ = drawn(case, with_pull=False)
-    plain = predict_traction(case, replace(draws, errors=None), 60.0, SLIP)
-    wide = predict_traction(case, draws, 60.0, SLIP)
+    plain = pulled(case, replace(draws, errors=None))
+    wide = pulled(case, draws)
     error = wide.pull - plain.pull
     assert error.std(axis=0) == pytest.approx(STATED, rel=0.15)
-    steeper = 60.0 * (np.sin(wide.slope[:, 1]) - np.sin(plain.slope[:, 1]))
-    assert np.corrcoef(steeper, error[:, 1])[0, 1] > 0.99
+    best = np.arange(400), np.argmax(wide.pull, axis=1)
+    steeper = 60.0 * (np.sin(wide.steepest_slope) - np.sin(plain.steepest_slope))
+    assert np.corrcoef(steeper, error[best])[0, 1] > 0.9

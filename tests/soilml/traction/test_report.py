@@ -9,7 +9,7 @@ from remarked import remarked
 
 from soilml import SlipSinkage
 from soilml.config.measurement_noise import Noise
-from soilml.traction.report import pull_report
+from soilml.traction import pull_report
 from soilml.traction.soil_draws import measured_soil
 
 pytestmark = pytest.mark.slow

@@ -12,9 +12,8 @@ from soilml.config.measurement_noise import Discrepancy
 from soilml.config.remainder import Remainder, RemainderPart
 from soilml.config.wheeled_rover import RoverWheel, WheeledRover
 from soilml.physics.effects import EFFECTS
+from soilml.traction import DrivenVehicle, performance, pull_report
 from soilml.traction.draws import SoilDraws
-from soilml.traction.rover_performance import rover_performance
-from soilml.traction.rover_report import rover_report
 
 NAMES = ("cohesion", "friction_angle", "shear_modulus")
 SOIL = np.asarray([900.0, 0.6, 0.012])
@@ -45,7 +44,7 @@ def total_pull(case, slip, slope, number=(1, 1, 2, 2)):
 
 
 def test_at_the_needed_slip_the_wheels_pull_the_weight_along_the_slope(case):
-    found = rover_performance(case, draws(), SLOPES, SLIP)
+    found = performance(DrivenVehicle.of_rover(case), draws(), SLOPES, SLIP)
     for slope, slip in zip(SLOPES, found.slip[0], strict=True):
         weight = case.rover.weight * np.sin(slope)
         assert total_pull(case, slip, slope) == pytest.approx(weight, abs=0.005 * case.rover.weight)
@@ -54,21 +53,26 @@ def test_at_the_needed_slip_the_wheels_pull_the_weight_along_the_slope(case):
 
 
 def test_the_steepest_slope_takes_all_the_pull_there_is(case):
-    found = rover_performance(case, draws(), SLOPES, SLIP)
+    found = performance(DrivenVehicle.of_rover(case), draws(), SLOPES, SLIP)
     slope = float(found.steepest_slope[0])
     pull = max(total_pull(case, slip, slope) for slip in SLIP)
     assert pull == pytest.approx(case.rover.weight * np.sin(slope), rel=1e-6)
-    beyond = rover_performance(case, draws(), np.asarray([slope * 1.01]), SLIP)
+    beyond = performance(DrivenVehicle.of_rover(case), draws(), np.asarray([slope * 1.01]), SLIP)
     assert beyond.climbed[0] == 0.0 and np.isnan(beyond.slip[0, 0]) and beyond.margin[0, 0] < 0.0
+
+
+def passes(case):
+    """Pass of each wheel of a rover."""
+    wheels = DrivenVehicle.of_rover(case).wheels
+    return {name: others["pass_number"] for name, (_, others) in wheels.items()}
 
 
 def test_wheels_in_a_rut_are_those_of_the_second_pass(case):
     again = replace(case, model=case.model + EFFECTS["multipass"]())
-    found = rover_performance(again, draws(), SLOPES, SLIP)
-    assert found.passes == {"front-left": 1, "front-right": 1, "rear-left": 2, "rear-right": 2}
+    assert passes(again) == {name: 1 + name.startswith("rear") for name in FOUR}
     apart = {k: replace(w, left=2.0 * w.left) if "rear" in k else w for k, w in FOUR.items()}
     beside = replace(again, rover=replace(case.rover, wheels=apart))
-    assert set(rover_performance(beside, draws(), SLOPES, SLIP).passes.values()) == {1}
+    assert set(passes(beside).values()) == {1}
 
 
 def measured(case, wheels):
@@ -82,7 +86,7 @@ def measured(case, wheels):
 def test_bands_of_a_rover_have_the_error_of_its_model(case):
     """At needed slip the torque has the declared error, whether declared or learned."""
     table = measured(case, list(FOUR))
-    plain = rover_report(case, table, slopes=SLOPES, exact_model=True)
+    plain = pull_report(case, table, slopes=SLOPES, exact_model=True)
     part = RemainderPart(
         "torque_Nm", "", 0.2, 0.3, 0.3, 0.6, (0.1, 0.5), (20.0, 20.1),
         ((0.3, 20.0),), (0.0,), ((0.0,),), ((0.0,),),
@@ -90,10 +94,10 @@ def test_bands_of_a_rover_have_the_error_of_its_model(case):
     learned = replace(case, remainder=Remainder((part,)))
     declared = replace(case, discrepancy={"torque_Nm": Discrepancy(constant=0.3)})
     for wide in (learned, declared):
-        found = rover_report(wide, table, slopes=SLOPES, exact_model=True)
+        found = pull_report(wide, table, slopes=SLOPES, exact_model=True)
         assert not remarked(found.warnings, "not errors of the model")
         assert remarked(found.warnings, "errors of the model (torque")
-        torque, exact = (f.performance.torque["front-left"][:, 0] for f in (found, plain))
+        torque, exact = (f.by_load[0].posterior.torque["front-left"][:, 0] for f in (found, plain))
         # the wheel carries 68.7 N, two lengths beyond the learned range: a usual error, 0.3 N m
         assert np.std(torque) == pytest.approx(np.hypot(0.3, np.std(exact)), rel=0.15)
     assert remarked(plain.warnings, "not errors of the model")

@@ -16,7 +16,7 @@ LINEAR = ROOT / "exported" / "wheel_linear.onnx"
 
 def test_both_files_are_written_and_their_memory_is_said(tmp_path, capsys):
     out = tmp_path / "linear.c"
-    assert main(["export-c", str(LINEAR), str(out)]) == 0
+    assert main(["export", "c", str(LINEAR), str(out)]) == 0
     header = out.with_suffix(".h").read_text()
     work = re.search(r"#define LINEAR_WORK_BYTES (\d+)", header)
     assert work and f"working memory {work[1]}" in capsys.readouterr().err
@@ -27,7 +27,7 @@ def test_both_files_are_written_and_their_memory_is_said(tmp_path, capsys):
 @pytest.mark.parametrize("name", ["1wheel.c", "Wheel.c", "my-wheel.c", "wheel v2.c"])
 def test_a_name_that_c_does_not_take_is_refused(name, tmp_path, capsys):
     refused(
-        ["export-c", LINEAR, tmp_path / name],
+        ["export", "c", LINEAR, tmp_path / name],
         capsys,
         "begins the names of the C functions",
         tmp_path,
@@ -36,7 +36,7 @@ def test_a_name_that_c_does_not_take_is_refused(name, tmp_path, capsys):
 
 @pytest.mark.parametrize("name", ["math.c", "string.c", "stdbool.c"])
 def test_a_name_that_would_hide_a_header_of_the_library_is_refused(name, tmp_path, capsys):
-    refused(["export-c", LINEAR, tmp_path / name], capsys, "would hide <", tmp_path)
+    refused(["export", "c", LINEAR, tmp_path / name], capsys, "would hide <", tmp_path)
 
 
 def test_an_operator_that_is_not_known_is_named():

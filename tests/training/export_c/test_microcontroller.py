@@ -29,7 +29,7 @@ def for_one_row(tmp_path_factory):
         if name not in made:
             made[name] = tmp_path_factory.mktemp(name) / f"{name}.c"
             model = str(ROOT / f"exported/{name}.onnx")
-            assert main(["export-c", model, str(made[name]), "--step-rows", "1"]) == 0
+            assert main(["export", "c", model, str(made[name]), "--step-rows", "1"]) == 0
         return made[name]
 
     return exported_file

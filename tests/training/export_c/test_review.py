@@ -59,7 +59,7 @@ def test_the_export_of_a_set_posterior_is_deterministic(exported, tmp_path):
     name = "wheel_small"
     model, out = ROOT / "exported" / f"{name}.onnx", tmp_path / f"{name}.c"
     program = "import sys; from soilml.cli import main; sys.exit(main(sys.argv[1:]))"
-    command = [sys.executable, "-c", program, "export-c", str(model), str(out)]
+    command = [sys.executable, "-c", program, "export", "c", str(model), str(out)]
     done = subprocess.run(command, env=os.environ | {"PYTHONHASHSEED": "7"}, cwd=ROOT)
     assert done.returncode == 0
     for made in (out, out.with_suffix(".h")):

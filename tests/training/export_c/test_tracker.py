@@ -102,7 +102,7 @@ def test_a_day_with_other_soils_glitches_stuck_sensors_and_a_drift(seed, name, c
 def test_one_row_at_a_time_takes_the_same_decisions(tmp_path):
     """The build for a microcontroller, which fits the rows in question one after the other."""
     source, words = tmp_path / "wheel_small.c", ["--step-rows", "1", "--length", "32"]
-    assert main(["export-c", "wheel_small", str(source), *words]) == 0
+    assert main(["export", "c", "wheel_small", str(source), *words]) == 0
     library = compile_library(source, tmp_path / "small.so", COMPILERS[0])
     model = CompiledModel(source.with_suffix(".h"), library)
     assert model.numbers["WHEEL_SMALL_TRACKER_LENGTH"] == 32

@@ -7,11 +7,10 @@ import { Plot } from "./plots.js";
 import { Slider } from "./sliders.js";
 import { wheelPicture } from "./wheel_picture.js";
 
-const FROM_FILE = "model-file";
 const CURVES = { torque: "N m", pull: "N", sinkage: "mm" };
 const OPEN = 2; // groups of sliders that are open at first
 
-const state = { model: "", modelName: "", sliders: new Map(), answer: null, kept: null };
+const state = { model: "", modelName: "", sliders: new Map() };
 const plots = {};
 let generation = 0, busy = false, again = false;
 
@@ -24,57 +23,28 @@ function chosen() {
 }
 
 export async function startForward(choices) {
-  state.choices = choices;
-  fillChoices(choices.first);
+  state.soils = choices.soils;
+  options(byId("wheel"), choices.wheels);
+  options(byId("soil"), choices.soils, choices.first);
   makePlots();
-  byId("wheel").addEventListener("change", choose);
-  byId("soil").addEventListener("change", choose);
+  for (const id of ["wheel", "soil"]) byId(id).addEventListener("change", () => {
+    state.model = "";
+    loadControls();
+  });
   byId("reset").addEventListener("click", () => {
     for (const slider of state.sliders.values()) slider.set(slider.first);
     update();
   });
-  byId("keep").addEventListener("click", keep);
-  await loadControls();
-}
-
-function fillChoices(first) {
-  const { wheels, soils } = state.choices;
-  const own = state.model ? [{ id: FROM_FILE, label: `from ${state.modelName}`, note: "" }] : [];
-  options(byId("wheel"), [...own, ...wheels], state.model ? FROM_FILE : first.wheel);
-  options(byId("soil"), [...own, ...soils], state.model ? FROM_FILE : first.soil);
-  notes();
-}
-
-function notes() {
-  for (const [id, list] of [["wheel", "wheels"], ["soil", "soils"]]) {
-    const entry = state.choices[list].find((e) => e.id === byId(id).value);
-    byId(`${id}-note`).textContent = entry ? entry.note : "as the model file has it";
-  }
-}
-
-async function choose() {
-  if (state.model && (byId("wheel").value !== FROM_FILE || byId("soil").value !== FROM_FILE)) {
-    const { first } = state.choices;
-    const keep = (id) => (byId(id).value === FROM_FILE ? first[id] : byId(id).value);
-    const next = { wheel: keep("wheel"), soil: keep("soil") };
-    state.model = "";
-    fillChoices(next);
-  }
-  notes();
   await loadControls();
 }
 
 /** Take a model file that was dropped; its error stands beside the choices. */
 export async function takeModel(text, name) {
-  const before = [state.model, state.modelName];
-  const values = { wheel: byId("wheel").value, soil: byId("soil").value };
-  [state.model, state.modelName] = [text, name];
-  if (!(await loadControls())) {
-    [state.model, state.modelName] = before;
-    return false;
-  }
-  fillChoices(values);
-  return true;
+  const before = { model: state.model, modelName: state.modelName };
+  Object.assign(state, { model: text, modelName: name });
+  if (await loadControls()) return true;
+  Object.assign(state, before);
+  return false;
 }
 
 async function loadControls() {
@@ -89,6 +59,9 @@ async function loadControls() {
     return false;
   }
   if (mine !== generation) return true;
+  byId("soil-note").textContent = state.model
+    ? `Now: the model file, ${state.modelName}. Choose a gear or a soil to leave it.`
+    : state.soils.find((entry) => entry.id === byId("soil").value).note;
   const opened = new Map([...document.querySelectorAll("details.group")].map((d) => [d.dataset.title, d.open]));
   state.sliders = new Map();
   const groups = found.groups.map(({ title, controls }, i) => {
@@ -98,7 +71,6 @@ async function loadControls() {
       element("summary", {}, title), ...made.map((slider) => slider.place));
   });
   byId("sliders").replaceChildren(...groups);
-  release();
   update();
   return true;
 }
@@ -132,10 +104,7 @@ function makePlots() {
   for (const [name, unit] of Object.entries(CURVES)) {
     plots[name] = new Plot(byId(`${name}-plot`), {
       x: "slip", y: null, reading: byId(`${name}-reading`),
-      series: [
-        { label: "", colour: name, unit, width: 2.5 },
-        { label: "kept", colour: "kept", unit, dash: [6, 5], width: 1.8 },
-      ],
+      series: [{ label: "", colour: name, unit, width: 2.5 }],
     });
   }
   plots.stress = new Plot(byId("stress-plot"), {
@@ -144,14 +113,11 @@ function makePlots() {
       { label: "σ", colour: "normal", unit: "kPa", width: 2.5 },
       { label: "τ", colour: "shear", unit: "kPa", width: 2.5 },
       { label: "strength", colour: "strength", unit: "kPa", dash: [6, 5], width: 1.8 },
-      { label: "kept σ", colour: "normal", dash: [2, 4], width: 1.4 },
-      { label: "kept τ", colour: "shear", dash: [2, 4], width: 1.4 },
     ],
   });
 }
 
 function draw(answer) {
-  state.answer = answer;
   showError("forward-error", answer.reason ? `Slip ${number(answer.at.slip)}, load ${withUnit(answer.at.load, "N")}: ${answer.reason}` : "");
   byId("now").replaceChildren(
     now("Torque", answer.at.torque, "N m"), now("Drawbar pull", answer.at.pull, "N"),
@@ -164,64 +130,19 @@ const now = (label, value, unit) => element("div", {}, element("dt", {}, label),
   element("dd", {}, number(value), element("small", {}, unit ? `\u00a0${unit}` : "")));
 
 function drawCurve(name, answer) {
-  const x = [...new Set([...answer.slip, ...(state.kept?.slip ?? [])])].sort((a, b) => a - b);
-  const line = (curve) => {
-    if (!curve) return x.map(() => null);
-    const known = new Map(curve.slip.map((s, i) => [s, curve[name][i]]));
-    return fill(x, known);
-  };
   const here = answer.at[name];
-  plots[name].set([x, line(answer), line(state.kept)],
-    [answer.at.slip, here, name],
+  plots[name].set([answer.slip, answer[name]], [answer.at.slip, here, name],
     `${name === "pull" ? "Drawbar pull" : name} against slip; ${withUnit(here, CURVES[name])} at slip ${number(answer.at.slip)}`);
 }
 
-/** A curve at the slips of all curves; linear between its own points. */
-function fill(x, known) {
-  const own = [...known.keys()].sort((a, b) => a - b);
-  let i = 0;
-  return x.map((s) => {
-    if (known.has(s)) return known.get(s);
-    if (s < own[0] || s > own.at(-1)) return null;
-    while (own[i + 1] < s) i += 1;
-    const [a, b] = [known.get(own[i]), known.get(own[i + 1])];
-    return a === null || b === null ? null : a + ((b - a) * (s - own[i])) / (own[i + 1] - own[i]);
-  });
-}
-
-function drawStress(answer) {
-  const { profile } = answer;
+function drawStress({ profile, ...answer }) {
   byId("stress-figure").hidden = !profile;
   if (!profile) return;
-  wheelPicture(byId("wheel-picture"), answer);
-  const kept = state.kept?.profile;
-  const back = (values) => [...values].reverse();
-  const mine = back(profile.angle);
-  const x = [...new Set([...mine, ...(kept ? kept.angle : [])])].sort((a, b) => a - b);
-  const line = (from, name) => (from ? fill(x, new Map(from.angle.map((a, i) => [a, from[name][i]]))) : x.map(() => null));
-  plots.stress.set([x, line(profile, "normal"), line(profile, "shear"), line(profile, "strength"),
-    line(kept, "normal"), line(kept, "shear")], null,
-  `Stress against angle: normal stress up to ${number(Math.max(...profile.normal))} kPa, shear stress up to ${number(Math.max(...profile.shear))} kPa, entry at ${number(profile.angle[0])} degrees`);
+  wheelPicture(byId("wheel-picture"), { profile, ...answer });
+  const lines = ["angle", "normal", "shear", "strength"].map((name) => [...profile[name]].reverse());
+  plots.stress.set(lines, null,
+    `Stress against angle: normal stress up to ${number(Math.max(...profile.normal))} kPa, shear stress up to ${number(Math.max(...profile.shear))} kPa, entry at ${number(profile.angle[0])} degrees`);
   byId("mobilised").textContent = `${percent(profile.mobilised)} of the shear strength below the wheel is mobilised. Torque is the shear stress summed along the rim: it grows with slip, and with a smaller shear modulus K, until τ reaches the strength.`;
-}
-
-function keep() {
-  if (state.kept) return release();
-  const { at } = state.answer;
-  state.kept = state.answer;
-  byId("keep").setAttribute("aria-pressed", "true");
-  byId("keep").textContent = "Drop the kept curves";
-  byId("kept").hidden = false;
-  byId("kept").textContent = `Kept (dashed): torque ${withUnit(at.torque, "N m")}, pull ${withUnit(at.pull, "N")}, sinkage ${withUnit(at.sinkage, "mm")} at slip ${number(at.slip)}, load ${withUnit(at.load, "N")}.`;
-  return draw(state.answer);
-}
-
-function release() {
-  state.kept = null;
-  byId("keep").setAttribute("aria-pressed", "false");
-  byId("keep").textContent = "Keep these curves";
-  byId("kept").hidden = true;
-  if (state.answer) draw(state.answer);
 }
 
 /** Set soil parameters (SI units by path), as an estimate found them. */

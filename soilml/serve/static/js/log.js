@@ -15,8 +15,7 @@ const TITLES = { identify: "The soil", gap: "What does the model lack?", pull: "
 const state = { logs: [], sheet: "", table: null, facts: null };
 
 const model = () => byId("model-text");
-export const modelText = () => model().value;
-export const tableKey = () => state.table;
+const modelText = () => model().value;
 
 export function startLog({ largest_file: largest, soils }) {
   byId("drop-note").textContent = `CSV, Parquet, spreadsheets, MATLAB, MCAP, bags, TOML; up to ${bytes(largest)} each`;

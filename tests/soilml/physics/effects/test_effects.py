@@ -3,6 +3,7 @@
 import inspect
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -33,24 +34,18 @@ CHANNELS = ("torque", "drawbar_pull", "sinkage")
 FORCES = ("load", "torque", "drawbar_pull", "sinkage", "entry_angle", "status")
 
 OF_WHEELS = [name for name, effect in EFFECTS.items() if effect.applies_to(WHEEL.gear)]
-#: With every rigid wheel that the effect applies to.
-on_every_wheel = pytest.mark.parametrize(
-    ("name", "gear"),
-    [
-        (name, gear)
-        for name in OF_WHEELS
-        for gear, cls in GEARS.items()
-        if issubclass(cls, RigidWheel) and EFFECTS[name].applies_to(cls(radius=0.15, width=0.12))
-    ],
-)
-every = pytest.mark.parametrize("name", OF_WHEELS)
 TRACK = Model(Track(radius=0.1, width=0.08, base=0.6))
-#: Those of tracks alone are tried on a track.
-on_its_gear = pytest.mark.parametrize("name", EFFECTS)
-shaped = pytest.mark.parametrize(
-    "name", [n for n in OF_WHEELS if issubclass(EFFECTS[n], SlipLoadScaling)]
-)
-needy = pytest.mark.parametrize("name", [n for n, c in EFFECTS.items() if c.about.needs])
+
+
+def wheels(name):
+    """Types of rigid wheels that an effect suits."""
+    rigid = (gear for gear, cls in GEARS.items() if issubclass(cls, RigidWheel))
+    return [gear for gear in rigid if EFFECTS[name].applies_to(GEARS[gear](radius=0.15, width=0.1))]
+
+
+def model_of(name):
+    """A wheel, or a track for an effect of tracks alone."""
+    return WHEEL if name in OF_WHEELS else TRACK
 
 
 def sized(name, share=1.0, **more):
@@ -78,90 +73,7 @@ def plain(gear):
     return solved(input_box(128, seed=4), gear=GEARS[gear], **known_to(128))
 
 
-@pytest.mark.slow
-@on_every_wheel
-def test_neutral_changes_nothing_to_the_last_bit(name, gear):
-    box = input_box(128, seed=4)
-    assert (box["slip"] < 0).any() and (box["slip"] > 0).any()
-    neutral = solved(box, [EFFECTS[name]()], GEARS[gear], **known_to(128))
-    for field in FORCES:
-        assert getattr(neutral, field).tobytes() == getattr(plain(gear), field).tobytes(), field
-
-
-@pytest.mark.slow
-@on_every_wheel
-def test_finite_over_the_whole_box_or_flagged(name, gear):
-    box, known = input_box(256, seed=8), known_to(256)
-    for share in (0.5, 2.0):
-        effect = sized(name, share)
-        force = solved(box, [effect], GEARS[gear], **known)
-        ok = force.status == Status.OK
-        assert ok.mean() > 0.3
-        for channel in CHANNELS:
-            assert np.isfinite(getattr(force, channel)[ok]).all()
-            assert np.isnan(getattr(force, channel)[~ok]).all()
-        at = Operating(slip=box["slip"], load=box["load"], **known)
-        true = apply_input_effects(LoadCase(Wheel(radius=0.1, width=0.1), SAND, at, (effect,))).at
-        np.testing.assert_allclose(force.load[ok], true.load[ok], rtol=1e-6)
-        assert (np.abs(true.slip) < 1).all() and (true.load > 0).all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if e.applies_to(TRACK.gear)])
-def test_a_track_is_left_alone_or_answered_or_flagged(name):
-    slip, load = (part.ravel() for part in np.meshgrid([-0.6, -0.1, 0.1, 0.7], [40.0, 400.0, 4e4]))
-    at = Operating(slip=slip, load=load, **known_to(slip.size))
-    before, neutral = TRACK(SAND, at), (TRACK + EFFECTS[name]())(SAND, at)
-    for field in FORCES:
-        assert getattr(neutral, field).tobytes() == getattr(before, field).tobytes(), field
-    force = (TRACK + sized(name))(SAND, at)
-    ok = force.status == Status.OK
-    assert ok.sum() >= 4
-    for channel in CHANNELS:
-        np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
-    changed = [np.abs(getattr(force, c) - getattr(before, c))[ok] > 1e-9 for c in CHANNELS]
-    assert np.any(changed)
-
-
-@pytest.mark.slow
-@every
-def test_any_size_within_its_bounds_is_answered_or_flagged(name):
-    box, known = input_box(64, seed=6), known_to(64)
-    size = EFFECTS[name].about.size
-    bounds = declared(EFFECTS[name])[size]
-    for value in (bounds.lower, bounds.upper):
-        force = solved(box, [EFFECTS[name](**{size: value})], **known)
-        ok = force.status == Status.OK
-        for channel in CHANNELS:
-            np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
-
-
-@on_its_gear
-def test_signs_are_as_declared(name):
-    effect, model = sized(name), WHEEL if name in OF_WHEELS else TRACK
-    before, changed = model(SAND, AT), (model + effect)(SAND, AT)
-    for channel, sign in effect.about.signs.items():
-        assert (sign * (getattr(changed, channel) - getattr(before, channel)) > 0).all()
-    assert any((getattr(changed, c) != getattr(before, c)).all() for c in CHANNELS)
-
-
-@on_its_gear
-def test_answers_change_smoothly_with_the_size(name):
-    model = WHEEL if name in OF_WHEELS else TRACK
-
-    def at_size(share):
-        force = (model + sized(name, share))(SAND, AT)
-        return np.stack([getattr(force, c) for c in CHANNELS])
-
-    h = 1e-4
-    coarse = (at_size(0.9 + 10 * h) - at_size(0.9 - 10 * h)) / (20 * h)
-    fine = (at_size(0.9 + h) - at_size(0.9 - h)) / (2 * h)
-    scale = np.abs(fine).max(axis=1, keepdims=True) + 1e-12
-    assert np.abs((coarse - fine) / scale).max() < 1e-4
-
-
-@pytest.mark.parametrize("name", EFFECTS)
-def test_is_described(name):
+def is_described(name):
     cls = EFFECTS[name]
     card, parameters = cls.about, declared(cls)
     assert cls.name == name
@@ -186,8 +98,7 @@ def test_is_described(name):
     check(sized(name))
 
 
-@pytest.mark.parametrize("name", EFFECTS)
-def test_is_computed_by_hand(name):
+def is_computed_by_hand(name):
     by_hand = Path(__file__).with_name("test_effects_by_hand.py")
     assert f'"{name}"' in by_hand.read_text(), (
         f"no test computes {name} by hand. Write one in tests/soilml/physics/effects/{by_hand.name}"
@@ -196,8 +107,7 @@ def test_is_computed_by_hand(name):
     )
 
 
-@pytest.mark.parametrize("name", EFFECTS)
-def test_its_parameters_are_published(name):
+def has_published_parameters(name):
     cls, rows = EFFECTS[name], PUBLISHED.read_text().splitlines()
     lacking = [
         f"{cls.__name__},{key},{own.unit},{own.lower},{own.upper},{getattr(cls(), key)}"
@@ -212,21 +122,41 @@ def test_its_parameters_are_published(name):
     )
 
 
-@needy
-def test_what_nobody_measured_is_asked_for_by_its_column(name):
-    (need,) = EFFECTS[name].about.needs
-    for effect in (EFFECTS[name](), sized(name)):
-        with pytest.raises(InputError) as caught:
-            (WHEEL + effect)(SAND, replace(AT, **{need: None}))
-        assert str(caught.value) == f"the effect {name} needs the column {COVARIATES[need]}"
+def has_the_declared_signs(name):
+    effect, model = sized(name), model_of(name)
+    before, changed = model(SAND, AT), (model + effect)(SAND, AT)
+    for channel, sign in effect.about.signs.items():
+        assert (sign * (getattr(changed, channel) - getattr(before, channel)) > 0).all()
+    assert any((getattr(changed, c) != getattr(before, c)).all() for c in CHANNELS)
 
 
-@shaped
-@pytest.mark.parametrize("slip, load", [(0.3, 100.0), (0.5, 40.0), (-0.2, 130.0)])
-def test_the_size_runs_with_slip_and_load_as_written(name, slip, load):
+def changes_smoothly_with_its_size(name):
+    def at_size(share):
+        force = (model_of(name) + sized(name, share))(SAND, AT)
+        return np.stack([getattr(force, c) for c in CHANNELS])
+
+    h = 1e-4
+    coarse = (at_size(0.9 + 10 * h) - at_size(0.9 - 10 * h)) / (20 * h)
+    fine = (at_size(0.9 + h) - at_size(0.9 - h)) / (2 * h)
+    scale = np.abs(fine).max(axis=1, keepdims=True) + 1e-12
+    assert np.abs((coarse - fine) / scale).max() < 1e-4
+
+
+def asks_for_its_column(name):
+    for need in EFFECTS[name].about.needs:
+        for effect in (EFFECTS[name](), sized(name)):
+            with pytest.raises(InputError) as caught:
+                (WHEEL + effect)(SAND, replace(AT, **{need: None}))
+            assert str(caught.value) == f"the effect {name} needs the column {COVARIATES[need]}"
+
+
+def runs_with_slip_and_load_as_written(name):
+    if name not in OF_WHEELS or not issubclass(EFFECTS[name], SlipLoadScaling):
+        return
+    slip, load = np.asarray([0.3, 0.5, -0.2]), np.asarray([100.0, 40.0, 130.0])
     at = replace(AT, slip=slip, load=load)
-    growth = ((abs(slip) + 0.03) / 0.33) ** 0.6 * (load / 100.0) ** 0.2
-    growth *= np.exp(0.7 * (abs(slip) - 0.3))
+    growth = ((np.abs(slip) + 0.03) / 0.33) ** 0.6 * (load / 100.0) ** 0.2
+    growth *= np.exp(0.7 * (np.abs(slip) - 0.3))
     laws = {"slip_power": 0.6, "by_load": 0.2, "by_slip": 0.7}
     running = (WHEEL + sized(name, 0.8, **laws))(SAND, at)
     size = EFFECTS[name].about.size
@@ -238,10 +168,9 @@ def test_the_size_runs_with_slip_and_load_as_written(name, slip, load):
         )
 
 
-@every
-def test_a_row_is_answered_alike_alone_and_among_others(name):
+def answers_a_row_alike_alone_and_among_others(name):
     slips = np.asarray([-0.3, -0.004, 0.004, 0.012, 0.2, 0.6])
-    model = WHEEL + sized(name, -1.0 if name == "slip-scale" else 1.0)
+    model = model_of(name) + sized(name, -1.0 if name == "slip-scale" else 1.0)
     together = model(SAND, replace(AT, slip=slips))
     for i, slip in enumerate(slips):
         alone = model(SAND, replace(AT, slip=slip))
@@ -249,6 +178,87 @@ def test_a_row_is_answered_alike_alone_and_among_others(name):
             np.testing.assert_allclose(
                 getattr(together, channel)[i], getattr(alone, channel), rtol=1e-10
             )
+
+
+def is_neutral_by_default_to_the_last_bit(name):
+    box = input_box(128, seed=4)
+    assert (box["slip"] < 0).any() and (box["slip"] > 0).any()
+    for gear in wheels(name):
+        neutral = solved(box, [EFFECTS[name]()], GEARS[gear], **known_to(128))
+        for field in FORCES:
+            assert getattr(neutral, field).tobytes() == getattr(plain(gear), field).tobytes(), field
+
+
+def is_finite_over_the_whole_box_or_flagged(name):
+    box, known = input_box(256, seed=8), known_to(256)
+    for gear, share in product(wheels(name), (0.5, 2.0)):
+        effect = sized(name, share)
+        force = solved(box, [effect], GEARS[gear], **known)
+        assert answered_or_flagged(force).mean() > 0.3
+        ok = force.status == Status.OK
+        at = Operating(slip=box["slip"], load=box["load"], **known)
+        true = apply_input_effects(LoadCase(Wheel(radius=0.1, width=0.1), SAND, at, (effect,))).at
+        np.testing.assert_allclose(force.load[ok], true.load[ok], rtol=1e-6)
+        assert (np.abs(true.slip) < 1).all() and (true.load > 0).all()
+
+
+def answered_or_flagged(force):
+    """Which rows have a number in every channel; the others have none, and a status."""
+    ok = force.status == Status.OK
+    for channel in CHANNELS:
+        np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
+    return ok
+
+
+def leaves_a_track_alone_or_is_answered_or_flagged(name):
+    if not EFFECTS[name].applies_to(TRACK.gear):
+        return
+    slip, load = (part.ravel() for part in np.meshgrid([-0.6, -0.1, 0.1, 0.7], [40.0, 400.0, 4e4]))
+    at = Operating(slip=slip, load=load, **known_to(slip.size))
+    before, neutral = TRACK(SAND, at), (TRACK + EFFECTS[name]())(SAND, at)
+    for field in FORCES:
+        assert getattr(neutral, field).tobytes() == getattr(before, field).tobytes(), field
+    force = (TRACK + sized(name))(SAND, at)
+    ok = answered_or_flagged(force)
+    assert ok.sum() >= 4
+    assert np.any([np.abs(getattr(force, c) - getattr(before, c))[ok] > 1e-9 for c in CHANNELS])
+
+
+def is_answered_or_flagged_at_the_bounds_of_its_size(name):
+    if name in OF_WHEELS:
+        size = EFFECTS[name].about.size
+        bounds = declared(EFFECTS[name])[size]
+        for value in (bounds.lower, bounds.upper):
+            effect = EFFECTS[name](**{size: value})
+            answered_or_flagged(solved(input_box(64, seed=6), [effect], **known_to(64)))
+
+
+#: Properties of every effect, and those that take a tenth of a second.
+QUICK = (
+    is_described, is_computed_by_hand, has_published_parameters, has_the_declared_signs,
+    changes_smoothly_with_its_size, asks_for_its_column, runs_with_slip_and_load_as_written,
+    answers_a_row_alike_alone_and_among_others,
+)  # fmt: skip
+SLOW = (
+    is_neutral_by_default_to_the_last_bit, is_finite_over_the_whole_box_or_flagged,
+    leaves_a_track_alone_or_is_answered_or_flagged,
+    is_answered_or_flagged_at_the_bounds_of_its_size,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_the_contract_of_effects(name, subtests):
+    for holds in QUICK:
+        with subtests.test(holds.__name__):
+            holds(name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EFFECTS)
+def test_an_effect_is_neutral_by_default_and_finite_or_flagged(name, subtests):
+    for holds in SLOW:
+        with subtests.test(holds.__name__):
+            holds(name)
 
 
 def test_the_two_forms_of_the_exit_angle_exclude_each_other():

@@ -1,6 +1,6 @@
 """Draw docs/serve.png: the live page with the verdict on its example.
 
-    python bench/live_page.py [FILE.png]
+    python docs/site/live_page.py [FILE.png]
 
 Needs `pip install '.[browser]'` and Chromium (SOILML_CHROMIUM=/path where it is not found).
 """
@@ -14,7 +14,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SIZE = {"width": 1280, "height": 1000}  # Of the picture
 LONG = 240_000  # Longest wait for the answer, ms
 

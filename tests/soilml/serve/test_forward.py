@@ -6,8 +6,7 @@ from conftest import MODEL
 
 from soilml import EFFECTS, Model, Operating, Wheel, soil
 from soilml.errors import InputError
-from soilml.serve.chosen_case import WHEELS
-from soilml.serve.forward_curves import controls, forward
+from soilml.serve.forward import GEARS, controls, forward
 
 
 def sliders(request):
@@ -35,7 +34,7 @@ def test_curves_and_stresses_are_those_of_the_model(slip):
     assert found["at"]["torque"] == pytest.approx(float(model(ground, at).torque), rel=1e-5)
 
 
-@pytest.mark.parametrize("wheel", WHEELS)
+@pytest.mark.parametrize("wheel", GEARS)
 def test_every_wheel_stands_on_every_soil_that_carries_it(wheel):
     values = {path: c["value"] for path, c in sliders({"wheel": wheel}).items()}
     found = forward({"wheel": wheel, "values": values})
