@@ -122,14 +122,6 @@ def test_after_a_fault_of_a_sensor_it_recovers_by_itself(fault):
     assert late.count("ACCEPTED") >= len(late) - 1
 
 
-def test_a_clock_that_is_set_back_begins_again_and_keeps_the_soil():
-    own = logic()
-    play(own, contents(drive(20, begin=1000)))
-    again = play(own, contents(drive(20, begin=7, seed=2)))
-    assert len(again) >= 18 and again[-1].level is Level.OK
-    assert again[-1].values["rows_remembered"] >= 36
-
-
 def test_a_bag_that_is_played_three_times_counts_once(prompt):
     """Also where odometry is late, so that its last messages come after the clock was set back."""
     own, found = logic(), []

@@ -157,7 +157,7 @@ LINES = {
     "pull model.toml runs.csv --load 0": "needed is a load above zero",
     "pull model.toml runs.csv --load much": "start:stop:count",
     "pull model.toml runs.csv --load 10:90:9": "at most 8",
-    "pull model.toml runs.csv --slope 10": "--slope needs a model file with [rover]",
+    "pull model.toml runs.csv --slope 70": "slopes must lie between 0 and 60 degrees",
     "pull model.toml runs.csv --by run --picture p.png": "--picture draws one soil",
     "bevameter runs.csv --format json -o soil.toml": "--format json and --out soil.toml differ",
 }

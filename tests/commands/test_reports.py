@@ -52,7 +52,12 @@ def folder(workplace):
 COMMANDS = {
     "identify": ["identify", "model.toml", "runs.csv", "--by", "run"],
     "estimate": ["estimate", str(ROOT / "exported/wheel_linear.onnx"), "runs.csv", "--by", "run"],
-    "pull": ["pull", "model.toml", "runs.csv", *("--load=60", "--slip-limit=0.4", "--by=run")],
+    "pull": [
+        "pull",
+        "model.toml",
+        "runs.csv",
+        *("--load=60", "--slip-limit=0.4", "--by=run", "--exact-model"),
+    ],
 }
 
 

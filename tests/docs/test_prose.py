@@ -45,12 +45,14 @@ def test_sentences_are_short_and_in_the_words_of_the_field():
 
 def texts(file):
     """Strings of a module that are no docstrings."""
-    tree = ast.parse(file.read_text())
-    nodes = [n for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)]
-    bodies = (n.body for n in ast.walk(tree) if isinstance(getattr(n, "body", None), list))
-    first = (body[0] for body in bodies if body and isinstance(body[0], ast.Expr))
-    docstrings = {id(statement.value) for statement in first}
-    return [node.value for node in nodes if id(node) not in docstrings]
+    found, docstrings = [], set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        body = getattr(node, "body", None)
+        if isinstance(body, list) and body and isinstance(body[0], ast.Expr):
+            docstrings.add(id(body[0].value))
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            found.append(node)
+    return [node.value for node in found if id(node) not in docstrings]
 
 
 def test_messages_use_the_words_of_the_field():

@@ -64,8 +64,8 @@ def _mat(*elements):
 
 
 def packed_mat():
-    """An array of 100 million bytes of zero, 97 kB."""
-    count = 100_000_000
+    """An array of 45 million bytes of zero, 44 kB."""
+    count = 45_000_000
     return _mat(_matrix(_BYTES, (count, 1), "force", _element(_UINT8, bytes(count))))
 
 
@@ -222,8 +222,8 @@ def long_names_parquet():
 
 
 def constant_parquet():
-    """As many equal rows as a table may have."""
-    return _parquet(_constant(9_900_000, run="a", slip=0.2, load_N=60.0, torque_Nm=2.0))
+    """More equal rows than are estimated."""
+    return _parquet(_constant(2_100_000, run="a", slip=0.2, load_N=60.0, torque_Nm=2.0))
 
 
 def large_dictionary_parquet():

@@ -25,6 +25,15 @@ def test_published_slip_weights(torque, vibration, weight):
         assert rule(np.zeros(2), std).weights[0] == pytest.approx(weight, abs=0.016)
 
 
+def test_the_middle_line_of_the_pairwise_rule_as_printed_does_not_sum_to_one():
+    """Comin and Saaj 2017, eq. 30."""
+    T, V, S = 0.3, 0.2, 0.1
+    printed = (V / (V + T) + S / (S + T), V / (V + T) + S / (V + S), T / (S + T) + V / (V + S))
+    assert abs(sum(printed) / 3 - 1) > 0.05
+    weights = pairwise(np.zeros(3), np.sqrt([T, V, S])).weights
+    assert 3 * weights == pytest.approx([printed[0], T / (V + T) + S / (V + S), printed[2]])
+
+
 def test_best_linear_is_the_constrained_optimum():
     rng = np.random.default_rng(2)
     for _ in range(20):

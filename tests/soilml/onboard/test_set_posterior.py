@@ -66,18 +66,6 @@ def test_copies_of_a_row_count_once(wheel_sets, wheel_posterior):
     assert_similar(wheel_sets.run(**copied), wheel_sets.run(**run), 1e-5)
 
 
-def test_a_declared_constant_noise_is_fed_as_the_interface_says(wheel_sets, wheel_posterior):
-    run, _ = simulated_run(wheel_posterior, 8)
-    constant, share = 0.2, 0.01
-    declared = wheel_sets.on(noise={"torque": (constant, share)}).run(**run)
-    std = np.hypot(constant, share * run["torque"])
-    factor = np.exp(-2.0 * (constant / run["torque"]) ** 2)
-    fed = run | {"torque": run["torque"] * factor, "torque_std": std * factor}
-    assert_similar(declared, wheel_sets.run(**fed), 1e-5)
-    by_row = wheel_sets.run(**run, torque_std=std)
-    assert (np.abs(declared.mean - by_row.mean) > 1e-3 * by_row.std).any()
-
-
 def test_the_estimate_out_of_range_is_the_prior(wheel_sets, wheel_posterior):
     upper = wheel_posterior.family.recipe.load.upper
     found = wheel_sets.run(slip=0.3, load=3.0 * upper, torque=0.05 * upper)
