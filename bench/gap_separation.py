@@ -12,7 +12,7 @@ from soilml.fitting.coordinates import select_free
 from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings, stack_readings
-from soilml.gap.scores import SignatureSimilarity
+from soilml.gap.identifiability import similarity
 from soilml.inference.constants import SCATTER_UNITS
 from soilml.inference.gaussian_terms import scatter_columns
 from soilml.io.table import Table
@@ -67,8 +67,10 @@ def separation(case: Case, table: Table, truth: dict[str, Any]) -> Separation:
         others = [white[other][:, None] for other in causes if other != name]
         rivals = {n: white[n] for n in columns if n not in causes}
         space = np.hstack([white_soil, *others])
-        similar = SignatureSimilarity.beside(space, {name: white[name]} | rivals)
-        found.append(Separation(float(similar.norm[0]), *similar.separation(name, 1.0)))
+        norm, cosine = similarity({name: white[name]} | rivals, space)
+        nearest, signal = int(np.argmax(cosine[0])), float(norm[0])
+        snr = signal * float(np.sqrt(max(0.0, 1.0 - cosine[0, nearest] ** 2)))
+        found.append(Separation(signal, snr, [name, *rivals][nearest]))
     return min(found, key=lambda s: s.snr)
 
 

@@ -52,11 +52,6 @@ def whole_number_from(lower: int, upper: int = 10**9) -> NumberFrom:
     return NumberFrom(lower, upper, whole=True)
 
 
-def parse_costs(args: argparse.Namespace) -> dict[str, float]:
-    """The costs of `--cost` by kind; raises `InputError` for a text that is not KIND=NUMBER."""
-    return named_numbers(args.cost, "--cost", "KIND=NUMBER, such as reverse=2")
-
-
 def named_numbers(texts: Sequence[str], option: str, needed: str) -> dict[str, float]:
     """Numbers by name from texts NAME=NUMBER; raises `InputError`, with what is `needed`."""
     found = {}

@@ -87,9 +87,6 @@ SHARED: dict[str, tuple[Argument, ...]] = {
         "ignore-extra",
     ),
     "seed": (("--seed N (0)", "seed of the random numbers", whole_number_from(0)),),
-    "cost": (
-        ("--cost KIND=NUMBER", "cost of a kind of run to add (else 1); can be repeated", REPEATED),
-    ),
     "workers": (
         ("--workers N", "number of processes (default: one for each core)", whole_number_from(1)),
     ),

@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
+from soilml.fitting.coordinates import Coordinate
 from soilml.gap.held_out import held_out_folds
 from soilml.gap.results import RemainderCause
 from soilml.gap.stage_changes import OPERATING, stage_changes
-from soilml.inference.constants import IN_CATALOGUE, UNKNOWN_CAUSE, UNKNOWN_SCALE
-from soilml.inference.evidence import LinearisedFit
+from soilml.inference.constants import IN_CATALOGUE
+from soilml.inference.evidence import LinearisedFit, linear_model
 from soilml.inference.explanation import Explanation
-from soilml.inference.gaussian_terms import FIXED, Hyperparameters
+from soilml.inference.gaussian_terms import Hyperparameters
 from soilml.inference.posterior import Posterior
+from soilml.inference.priors import LOG_2PI, densities_of_amplitude
+from soilml.numerics.prior import Prior
 from soilml.numerics.smooth_process import process_columns
 from soilml.physics.operating_point import COVARIATES
 
 #: Correlation lengths of a change: in slip, in the logarithms of load and of sinkage, and of other
 #: quantities as a share of their range. Those of slip and load are those of a discrepancy.
 SLIP_LENGTH, LOG_LENGTH, SHARE_OF_RANGE = 0.3, 0.6, 0.5
-#: Amplitudes of a change that are tried, in usual ones: steps of a factor of about 1.6, which
-#: change the evidence by less than 1 near its maximum.
-AMPLITUDES = np.asarray([0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0, 25.0])
+#: Amplitudes of a change that are tried, in usual ones: steps of a factor of about 2.5, which
+#: change the evidence by about 1 near its maximum.
+AMPLITUDES = np.asarray([0.15, 0.4, 1.0, 2.5, 6.3, 16.0])
 #: Factor on differences of the evidence: amplitudes at their maximum overstate it.
 TEMPERING = 0.5
 #: Amplitude of a discrepancy, relative to that beside the fit, that a change may leave.
@@ -39,17 +41,6 @@ NO_STAGE = 0.5
 #: What an error of slip or load may depend on: they are not measured in the contact.
 OF_OPERATION = ("slip", "load", "slip and load", "progress")
 SEVERAL = "several causes"
-
-
-def _amplitude_penalty() -> Floats:
-    """-2 ln of the prior probability of each of `AMPLITUDES`: that of a discrepancy's."""
-    edges = np.concatenate([[0.0], np.sqrt(AMPLITUDES[1:] * AMPLITUDES[:-1]), [np.inf]])
-    usual, unknown = 1.0 - np.exp(-edges), 2.0 / np.pi * np.arctan(edges / UNKNOWN_SCALE)
-    mass = np.diff((1.0 - UNKNOWN_CAUSE) * usual + UNKNOWN_CAUSE * unknown)
-    return np.asarray(-2.0 * np.log(mass))
-
-
-AMPLITUDE_PENALTY = _amplitude_penalty()
 
 
 @dataclass(frozen=True)
@@ -90,62 +81,58 @@ def described_cause(posterior: Posterior, node: Explanation, seed: int) -> Remai
         return None
     if not np.isfinite([*fit.prediction, *fit.linearisation.log_sinkage]).all():
         return None
-    none, found = weighed(posterior, node)
-    stage, probability = likeliest_stage(none, found)
-    if not probability > STATED_ODDS / (1.0 + STATED_ODDS):
+    none, found = _weighed(posterior, node)
+    stages = _grouped([(one.stage, one.value) for one in found])
+    each = (1.0 - NO_STAGE) / max(len(stages), 1)
+    prior = {SEVERAL: NO_STAGE, **dict.fromkeys(stages, each)}
+    stage, share = _likeliest({SEVERAL: [none], **stages}, prior)
+    if stage == SEVERAL or not share > STATED_ODDS / (1.0 + STATED_ODDS):
         return None
     own = [one for one in found if one.stage == stage]
     best = min(own, key=lambda one: one.value)
     gain = _predictive_gain(posterior, node, best, seed)
     if not gain > 0.0:
         return None
-    variables = dict.fromkeys(one.variable for one in own)
-    logs = {v: _log_mean(one.value for one in own if one.variable == v) for v in variables}
-    variable, share = _normalised(logs)
-    told = share > VARIABLE_ODDS / (1.0 + VARIABLE_ODDS)
-    probability *= IN_CATALOGUE  # as of any cause that is stated
-    beside = node.hypothesis.effects
-    return RemainderCause(stage, variable if told else "", probability, gain, beside)
+    variables = _grouped([(one.variable, one.value) for one in own])
+    variable, told = _likeliest(variables, dict.fromkeys(variables, 1.0))
+    if not told > VARIABLE_ODDS / (1.0 + VARIABLE_ODDS):
+        variable = ""
+    probability = IN_CATALOGUE * share  # as of any cause that is stated
+    return RemainderCause(stage, variable, probability, gain, node.hypothesis.effects)
 
 
-def likeliest_stage(none: float, found: Sequence[StageHypothesis]) -> tuple[str, float]:
-    """The stage of largest probability, and that.
-
-    Several causes together, which have the probability `NO_STAGE` beforehand, are no stage: where
-    they are likeliest, the probability is zero.
-    """
-    stages = dict.fromkeys(one.stage for one in found)
-    if not stages:
-        return SEVERAL, 0.0
-    each = np.log((1.0 - NO_STAGE) / len(stages))
-    logs = {s: _log_mean(one.value for one in found if one.stage == s) + each for s in stages}
-    best, share = _normalised({SEVERAL: _log_mean([none]) + np.log(NO_STAGE), **logs})
-    return best, 0.0 if best == SEVERAL else share
+def _grouped(pairs: Sequence[tuple[str, float]]) -> dict[str, list[float]]:
+    """Values by name."""
+    found: dict[str, list[float]] = {}
+    for name, value in pairs:
+        found.setdefault(name, []).append(value)
+    return found
 
 
-def _normalised(logs: Mapping[str, float]) -> tuple[str, float]:
-    """The likeliest by logarithms of probabilities, and its share."""
+def _likeliest(
+    values: Mapping[str, Sequence[float]], prior: Mapping[str, float]
+) -> tuple[str, float]:
+    """The likeliest group, and its share, by the mean tempered likelihood of its -2 ln p."""
+    logs = {
+        name: np.logaddexp.reduce(-0.5 * TEMPERING * np.asarray(own))
+        + np.log(prior[name] / len(own))
+        for name, own in values.items()
+    }
     best = max(logs, key=lambda name: logs[name])
-    return best, 1.0 / sum(float(np.exp(own - logs[best])) for own in logs.values())
-
-
-def _log_mean(values: Iterable[float]) -> float:
-    """Logarithm of the mean tempered likelihood of values of -2 ln p."""
-    logs = -0.5 * TEMPERING * np.asarray(list(values))
-    return float(np.logaddexp.reduce(logs) - np.log(len(logs)))
+    return best, float(np.exp(logs[best] - np.logaddexp.reduce(list(logs.values()))))
 
 
 def _predictive_gain(
     posterior: Posterior, node: Explanation, best: StageHypothesis, seed: int
 ) -> float:
     """Log density of rows kept back with the change, above that without; nil without such rows."""
-    parts = held_out_folds(posterior.terms.readings, seed).values()
-    assert best.at is not None
-    changed, at = _with_change(node.linear, best), best.at
+    parts, at = held_out_folds(posterior.terms.readings, seed).values(), best.at
+    assert at is not None
+    changed = _beside_changes(posterior, node, best.columns, best.amplitude)
     sums = [
         sum(
-            _log_density(changed, at, folds.fold == k)
-            - _log_density(node.linear, node.at, folds.fold == k)
+            changed.log_density(at, folds.fold == k)
+            - node.linear.log_density(node.at, folds.fold == k)
             for k in folds.predicted
         )
         for folds in parts
@@ -153,23 +140,16 @@ def _predictive_gain(
     return float(np.mean(sums)) if sums else 0.0
 
 
-def _log_density(model: LinearisedFit, at: Hyperparameters, out: NDArray[np.bool_]) -> float:
-    """Log density of the readings that are kept back, given the others."""
-    rest = model.without(model.outliers | out)
-    return -0.5 * (model.evaluate(at).value - rest.evaluate(at).value)
+def _beside_changes(
+    posterior: Posterior, node: Explanation, columns: Floats, amplitude: float
+) -> LinearisedFit:
+    """The neighbourhood of a fit with changes (m, k), whose weights have this amplitude."""
+    weight = Coordinate("change", "1", Prior(0.0, 1.0), normal_std=amplitude)
+    extra = [(weight, column) for column in columns.T]
+    return linear_model(posterior.terms, node.fit, node.outliers, extra)
 
 
-def _with_change(model: LinearisedFit, one: StageHypothesis) -> LinearisedFit:
-    """The model with a change of a stage, at its likeliest amplitude."""
-    terms = model.terms
-    columns = np.column_stack([terms.columns, one.amplitude * one.columns])
-    group = np.append(terms.group, np.full(one.columns.shape[1], FIXED))
-    return replace(
-        model, terms=replace(terms, columns=columns, group=group, _kept={}), _products={}, _taken={}
-    )
-
-
-def hypotheses(posterior: Posterior, node: Explanation) -> list[StageHypothesis]:
+def _changes(posterior: Posterior, node: Explanation) -> list[StageHypothesis]:
     """All changes of stages and of single channels, by what they may depend on."""
     readings, usual, fit = posterior.terms.readings, posterior.terms.usual, node.fit
     variables = _variables(posterior, node)
@@ -208,51 +188,31 @@ def _variables(posterior: Posterior, node: Explanation) -> dict[str, Floats]:
     return {name: own for name, own in found.items() if own.shape[1] > 1}
 
 
-def weighed(posterior: Posterior, node: Explanation) -> tuple[float, list[StageHypothesis]]:
-    """The evidence that no stage is needed, and all hypotheses with theirs.
+def _weighed(posterior: Posterior, node: Explanation) -> tuple[float, list[StageHypothesis]]:
+    """The evidence that no stage is needed, and all changes with theirs.
 
-    Each change is considered beside the discrepancy of the fit, a smaller one, and none.
+    Each change is considered beside the discrepancy of the fit, a smaller one, and none. Its
+    amplitude has the prior of a discrepancy's.
     """
-    found, at = hypotheses(posterior, node), node.at
+    found, at, p = _changes(posterior, node), node.at, len(node.fit.x)
     less = np.where(np.arange(len(at.log)) < posterior.terms.channels, np.log(SMALLER), 0.0)
-    patterns = [at, replace(at, log=at.log + less), replace(at, present=False)]
-    model, p = node.linear, len(node.fit.x)
-    columns = np.column_stack([model.jacobian, *(one.columns for one in found)])
-    wide = replace(model, jacobian=columns, x=np.zeros(columns.shape[1]), _products={}, _taken={})
-    starts = p + np.cumsum([0, *(one.columns.shape[1] for one in found)])
-    values = np.full((len(found), len(patterns), len(AMPLITUDES)), np.inf)
+    columns = np.column_stack([one.columns for one in found])
+    wide = _beside_changes(posterior, node, columns, 1.0)
+    last = p + np.cumsum([one.columns.shape[1] for one in found])
+    prior = AMPLITUDES * sum(densities_of_amplitude(AMPLITUDES))
+    penalties = -2.0 * np.log(prior / prior.sum())
     none = np.inf
-    for j, pattern in enumerate(patterns):
+    for pattern in (at, replace(at, log=at.log + less), replace(at, present=False)):
         products, constant = wide.reduced(pattern)
-        constant += model.beside(pattern, model.evaluate(pattern).curvature)
-        plain = np.append(np.arange(p), -1)
-        none = min(
-            none, float(_evidence(model, products[np.ix_(plain, plain)][None])[0] + constant)
-        )
-        for i in range(len(found)):
-            own = np.arange(starts[i], starts[i + 1])
-            size, vector = np.linalg.eigh(products[np.ix_(own, own)])
-            rotated = vector.T @ products[np.ix_(own, plain)]
-            square = AMPLITUDES[:, None] ** 2
-            growth = square * np.maximum(size, 0.0)
-            shrink = square / (1.0 + growth)
-            left = products[np.ix_(plain, plain)] - (shrink[:, None, :] * rotated.T) @ rotated
-            value = _evidence(model, left) + constant + np.log1p(growth).sum(axis=1)
-            values[i, j] = value + AMPLITUDE_PENALTY
-    weighed_ = []
-    for one, each in zip(found, values, strict=True):
-        j, k = divmod(int(np.argmin(each)), len(AMPLITUDES))
-        amplitude = float(AMPLITUDES[k])
-        weighed_.append(replace(one, value=float(each[j, k]), at=patterns[j], amplitude=amplitude))
-    return none, weighed_
-
-
-def _evidence(model: LinearisedFit, products: Floats) -> Floats:
-    """-2 ln p (b,) with the coordinates integrated out, from products (b, p + 1, p + 1)."""
-    p, free = len(model.x), ~model.held
-    curvature = products[:, :p, :p] + np.diag(model.precision) + model.information
-    gradient = np.where(free, products[:, :p, p] - model.pull, 0.0)
-    moving = np.where(free[:, None] & free, curvature, np.eye(p))
-    step = np.linalg.solve(moving, gradient[..., None])[..., 0]
-    gain = (gradient * step).sum(axis=1)
-    return np.asarray(products[:, p, p] - gain + np.linalg.slogdet(curvature)[1])
+        constant += wide.beside(pattern, node.linear.evaluate(pattern).curvature)
+        none = min(none, wide.evidence_with(products, constant, range(p), p)[0])
+        for amplitude, penalty in zip(AMPLITUDES, penalties, strict=True):
+            precision, of_prior = wide.precision.copy(), wide.constant.copy()
+            precision[p:], of_prior[p:] = amplitude**-2, 2.0 * np.log(amplitude) + LOG_2PI
+            scaled = replace(wide, precision=precision, constant=of_prior)
+            for i, one in enumerate(found):
+                own = [*range(p), *range(last[i] - one.columns.shape[1], last[i])]
+                value = scaled.evidence_with(products, constant, own, len(own))[0] + penalty
+                if value < one.value:
+                    found[i] = replace(one, value=value, at=pattern, amplitude=float(amplitude))
+    return none, found

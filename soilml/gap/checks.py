@@ -16,7 +16,6 @@ MIN_REPEAT_DEGREES_OF_FREEDOM = 6
 #: Readings beyond the number of soil parameters that an analysis needs, and that a name needs: with
 #: fewer, the noise cannot be told from the declared one.
 MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS = 4, 8
-ONE_LOAD = "one-load"  # Code of the obstacle that one load cannot test the soil parameters
 
 
 def faults_of(readings: Readings, parameters: int) -> Iterator[Remark]:
@@ -51,19 +50,20 @@ def naming_obstacles(readings: Readings, parameters: int) -> Iterator[Remark]:
     if len(readings) < parameters + NAMING_RESIDUAL_READINGS:
         yield _few_readings(readings, parameters, NAMING_RESIDUAL_READINGS, " to name a cause")
     if len(readings.runs) < 2:
-        text = "one run only: run-to-run variation of the soil cannot be separated from a gap"
+        text = "there is one run only: its variation cannot be told from a gap"
         yield Remark("one-run", text)
     if readings.load_levels.count < 2:
-        yield Remark(ONE_LOAD, "one load only: soil parameters and effects are confounded")
+        text = "there is one load only: soil parameters and effects are confounded"
+        yield Remark("one-load", text)
     if readings.slip_levels.count < 3:
-        text = "fewer than three slips: effects that vary with slip cannot be distinguished"
+        text = "there are too few slips: with two, effects that vary with slip look alike"
         yield Remark("few-slips", text)
 
 
 def _few_readings(readings: Readings, parameters: int, least: int, what: str) -> Remark:
     count = "1 reading" if len(readings) == 1 else f"{len(readings)} readings"
-    text = f"{count} for {parameters} soil parameters: at least {parameters + least} readings are "
-    return Remark("few-readings", f"{text}needed{what}")
+    text = f"there are few readings: {count} for {parameters} soil parameters; at least "
+    return Remark("few-readings", f"{text}{parameters + least} are needed{what}")
 
 
 def estimate_repeat_noise(readings: Readings) -> tuple[dict[str, float], list[Remark]]:

@@ -9,26 +9,26 @@ import numpy as np
 
 from soilml.fitting.least_squares import Solution
 from soilml.gap.results import Suspect
-from soilml.gap.sentences import NOT_DECISIVE
 from soilml.inference import constants
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Names, Posterior
-from soilml.quantities import column
 from soilml.remarks import Remark
 
 LISTED_SUSPECTS = 8  # Suspects that are listed
+#: Why nothing is named where the evidence for the suspects is weak.
+NOT_DECISIVE = Remark("not-decisive", "the evidence is not decisive beside the model's usual error")
 #: Why an explanation that the evidence supports is not claimed, by codes.
 _DOUBTS = {
-    "implausible-fault": "{} would explain the gap, but would have to be implausibly large for a "
-    "fault of a sensor or of the rig: check that first",
-    "implausible-size": "{} would have to be far larger than it usually is, so that its law or the "
-    "cause is another one",
-    "not-predictive": "{} fits the rows, but beside a smooth remainder, it predicts rows that were "
-    "kept back no better than the soil alone does",
-    "other-law": "the law of {} would have to differ much from that of the catalogue, so that the "
-    "cause may be one that the catalogue lacks",
-    "unchecked-fault": "{} explains the gap, but what looks like a fault of a sensor or of the rig "
-    "may be a law that the catalogue lacks: check it, and state the check with --checked",
+    "implausible-fault": "{} would be an implausibly large fault: check the sensor or the rig",
+    "implausible-size": "{} would have to be implausibly large: its law or the cause is another",
+    "not-predictive": "{} predicts rows kept back no better than the soil alone: it fits the rows, "
+    "but so does a smooth remainder",
+    "other-law": "the law of {} would differ much from the catalogue's: the cause may be one that "
+    "the catalogue lacks",
+    "not-catalogued": "a large discrepancy is left beside {}: at least four times the usual error "
+    "of a model",
+    "unchecked-fault": "{} is a fault that nothing has checked: a law that the catalogue lacks may "
+    "look like it; check it, and state the check with --checked",
 }
 
 
@@ -40,7 +40,7 @@ class Decision:
     claimed: tuple[Names, ...] = ()  # the sets that are stated as causes
     listed: tuple[Names, ...] = ()  # those that the data do not reject, the first suspect first
     shown: Explanation | None = None  # that of the first one; None where nothing is suspected
-    reason: Remark | None = None  # why what the evidence supports is not claimed
+    reasons: tuple[Remark, ...] = ()  # why no cause is named, or no agreement stated
 
 
 def ranked_sets(posterior: Posterior) -> list[Names]:
@@ -72,41 +72,35 @@ def not_rejected(posterior: Posterior, ranked: Sequence[Names]) -> tuple[Names, 
 
 
 def decide(
-    posterior: Posterior,
-    gains: Mapping[Names, float],
-    obstacles: Sequence[Remark],
-    disagreements: Sequence[Remark],
+    posterior: Posterior, gains: Mapping[Names, float], obstacles: Sequence[Remark]
 ) -> Decision:
-    """The status of a report; see `soilml.gap.statuses.STATUSES`.
+    """The status of a report where a gap is likely; see `soilml.gap.statuses.STATUSES`.
 
     gains: Log density of rows kept back by the first sets, above that of the soil alone.
     obstacles: Why these runs cannot identify a cause.
-    disagreements: Measurements that disagree with each other, which forbid a verdict without a gap.
     """
-    none = posterior.no_effect
-    if posterior.no_gap > constants.LIKELIER:
-        return Decision("undecided" if disagreements else "no-gap")
+    none, reasons = posterior.no_effect, tuple(obstacles)
     ranked = ranked_sets(posterior)
     chance = posterior.probability(*ranked[0]) if ranked else 0.0
     if _is_other_soil(posterior) and none > max(constants.UNCERTAIN, chance):
-        return Decision("undecided")
+        return Decision("undecided", reasons=reasons)
     hopeless = 1.0 - constants.UNCERTAIN if obstacles else 0.0
     if not ranked or (none > constants.UNCERTAIN and none > max(chance, hopeless)):
-        return Decision("not-testable" if obstacles else "unknown")
+        return Decision("not-testable" if obstacles else "unknown", reasons=reasons)
     listed = not_rejected(posterior, ranked)
     best = listed[0]
     node = posterior.node_of(best)
     assert node is not None
-    suspected = Decision("suspected", (), listed, node)
+    suspected = Decision("suspected", (), listed, node, reasons)
     if obstacles:
         return suspected
-    if reason := _doubt(posterior, node, gains.get(best, np.inf)):
-        return replace(suspected, reason=reason)
+    if doubt := _doubt(posterior, node, gains.get(best, np.inf)):
+        return replace(suspected, reasons=(doubt,))
     if none > constants.UNCERTAIN:
-        return replace(suspected, reason=NOT_DECISIVE)
+        return replace(suspected, reasons=(NOT_DECISIVE,))
     if chance >= constants.NAMED_PROBABILITY:
         if unchecked := _unchecked_faults(posterior, best):
-            return replace(suspected, reason=_reason("unchecked-fault", unchecked))
+            return replace(suspected, reasons=(_reason("unchecked-fault", unchecked),))
         status = "named"
         if node.share_without < constants.LIKELIER:
             status = "partly-named"
@@ -116,7 +110,7 @@ def decide(
     together = sum(posterior.sets[names] for names in listed)
     if none <= constants.CHANCE and len(listed) > 1 and together >= constants.LIKELIER:
         return Decision("class", listed, listed, node)
-    return replace(suspected, reason=NOT_DECISIVE)
+    return replace(suspected, reasons=(NOT_DECISIVE,))
 
 
 def _is_other_soil(posterior: Posterior) -> bool:
@@ -140,10 +134,7 @@ def _doubt(posterior: Posterior, node: Explanation, gain: float) -> Remark | Non
         return _reason("not-predictive", names)
     amplitude = posterior.terms.amplitude(node.at)
     if amplitude.max(initial=0.0) >= constants.LARGE_REMAINDER:
-        left = posterior.terms.readings.channels[int(np.argmax(amplitude))]
-        text = f"beside {' + '.join(names)}, at least four times the usual error of a model is left"
-        text += f" in the {left.replace('_', ' ')}"
-        return Remark("not-catalogued", text, (*names, column(left)))
+        return _reason("not-catalogued", names)
     if posterior.by_other_law(node.hypothesis):
         return _reason("other-law", names)
     return None
@@ -194,16 +185,6 @@ def suspects(
         chance = posterior.probability(*names)
         found.append(Suspect(names, odds, chance, gains.get(names), sizes))
     return found
-
-
-def reasons(
-    decision: Decision, obstacles: Sequence[Remark], disagreements: Sequence[Remark]
-) -> tuple[Remark, ...]:
-    """Why no cause can be named, or why the absence of a gap is not stated."""
-    own = (decision.reason,) if decision.reason else ()
-    by_status = {"undecided": disagreements, "not-testable": obstacles}
-    by_status["suspected"] = (*obstacles, *own)
-    return tuple(by_status.get(decision.status, own))
 
 
 def law_matters(posterior: Posterior, node: Explanation) -> bool:

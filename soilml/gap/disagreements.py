@@ -1,96 +1,105 @@
-"""What speaks against agreement of a model and its rows: misfit, priors, rows that disagree."""
+"""What speaks against agreement of a model and its rows, although no smooth gap was found."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Mapping
 
-from soilml.arrays import Floats
+import numpy as np
+
 from soilml.config.case import Case
 from soilml.fitting.least_squares import Solution
-from soilml.fitting.misfit import (
-    declared_misfit,
-    excess_residuals,
-    excess_residuals_remark,
-    misfit_limit,
-)
-from soilml.fitting.predictions import linearise
-from soilml.fitting.readings import Readings
-from soilml.gap.held_out import held_out_region
-from soilml.gap.results import NoiseAgreement
-from soilml.gap.scores import chi_square_tail
+from soilml.fitting.misfit import Misfit, excess_residuals_remark, misfit_limit
+from soilml.gap.held_out import FITTED
+from soilml.gap.results import GapReduction
 from soilml.identification.fit import disagreeing_soil_tests
-from soilml.inference.conditional import conditional
 from soilml.inference.constants import PRESSED, SCATTER_UNITS
-from soilml.inference.gaussian_terms import scatter_columns, terms_like
 from soilml.inference.posterior import Posterior
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import decimal, format_quantity
 
-#: Code of the reason that the soil alone explains the rows where its priors are opened.
-OUTSIDE_PRIORS = "soil-outside-priors"
 #: Estimated over declared noise from which the noise counts as scaled up. Its standard error is
 #: about 10 % with the usual fifty degrees of freedom of a channel.
 NOISE_SCALED_UP = 1.3
 #: Run-to-run standard deviation, in usual ones, above which runs disagree with each other.
 UNUSUAL_RUN_EFFECT = 3.0
-REGION_LEVEL = 0.001  # Significance level of the test of rows that a fit to the others predicts
+#: Mean squared residual of rows kept back that scatter of a few runs seldom leaves: of two runs,
+#: once in fifty times.
+UNEXPLAINED = 4.0
 
 
-def noise_agreement(
-    case: Case, readings: Readings, posterior: Posterior, alone: Solution
-) -> NoiseAgreement | None:
-    """The misfit under the declared noise, and under noise and scatter, of the same readings.
+def disagreements(
+    posterior: Posterior,
+    case: Case,
+    misfit: Misfit | None,
+    alone: Solution,
+    figures: Mapping[str, GapReduction],
+) -> list[Remark]:
+    """What disagrees with what; empty where nothing does.
 
-    None where no fit is possible.
-
-    readings: All readings as declared; those that stray count in neither.
-    alone: The soil alone under noise and scatter.
+    misfit: Of the soil alone, under the declared noise.
+    alone: The soil alone, under noise and scatter.
+    figures: Of rows kept back, by the soil alone.
     """
-    kept, soil = ~posterior.outliers, posterior.problem.soil
-    found = declared_misfit(case, readings.subset(kept), soil, alone.x)
-    if found is None:
-        return None
-    units = SCATTER_UNITS["friction_angle"], SCATTER_UNITS["bearing"]
-    angle, bearing = posterior.terms.scatter(posterior.noise) * units
-    left = max(int(kept.sum()) - len(soil), 1)
-    return NoiseAgreement(
-        declared=found.per_freedom,
-        exceeds_noise=found.exceeds_noise,
-        granted=alone.cost / left,
-        friction_angle_std=float(angle),
-        bearing_std=float(bearing),
-        with_discrepancy=bool(case.discrepancy),
-    )
+    soil, terms = posterior.soil, posterior.terms
+    found = _excess_residuals(posterior, case, misfit, alone)
+    at = soil.without.at
+    for name, scale in zip(terms.readings.channels, terms.noise_scale(at), strict=True):
+        if scale >= NOISE_SCALED_UP:
+            size = f"those of {column(name)} {decimal(scale, 2)} times as much"
+            text = f"readings scatter more than their declared noise: {size}"
+            found.append(Remark("noise-scaled", text, (column(name),)))
+    angle, bearing = terms.scatter(at)
+    if max(angle, bearing) >= UNUSUAL_RUN_EFFECT:
+        degrees = np.degrees(angle * SCATTER_UNITS["friction_angle"])
+        share = bearing * SCATTER_UNITS["bearing"]
+        text = (
+            "runs differ from each other like different soils: their friction angle varies by "
+            f"{degrees:.2g} deg, and their bearing strength by {share:.0%}"
+        )
+        found.append(Remark("runs-differ", text))
+    found += [
+        Remark(
+            "region-not-predicted",
+            "rows kept back are not predicted by the others: mean squared residual "
+            f"{decimal(g.before, 2)} (1 is expected), {g.description}",
+            (name,),
+        )
+        for name, g in figures.items()
+        if name != FITTED and g.before > UNEXPLAINED
+    ]
+    found += [
+        Remark("soil-test", f"the rows disagree with a test of the soil: {text}")
+        for text in disagreeing_soil_tests(soil.fit.case, soil.fit.values())
+    ]
+    return found
 
 
-def misfit_remarks(
-    found: NoiseAgreement | None, case: Case, posterior: Posterior, alone: Solution
+def _excess_residuals(
+    posterior: Posterior, case: Case, misfit: Misfit | None, alone: Solution
 ) -> list[Remark]:
     """Residuals beyond the declared noise that scatter does not account for.
 
     Where the noise that the residuals show, rough in slip, alone accounts for them, the priors are
     not doubted.
     """
-    if found is None or not found.exceeds_noise:
+    if misfit is None or not misfit.exceeds_noise:
         return []
-    readings = posterior.terms.readings
+    readings, terms, at = posterior.terms.readings, posterior.terms, posterior.noise
     left = max(len(readings) - len(posterior.problem.soil), 1)
-    if found.grants_scatter and found.granted <= misfit_limit(left):
+    granted = alone.cost / max(int((~posterior.outliers).sum()) - len(posterior.problem.soil), 1)
+    if terms.scatter(at).any() and granted <= misfit_limit(left):
         return []
-    factor = float(np.sqrt(found.declared))
-    scale = posterior.terms.noise_scale(posterior.noise)[readings.channel]
-    noisier = found.declared / float(np.mean(scale**2)) <= misfit_limit(left)
+    scale = terms.noise_scale(at)[readings.channel]
+    noisier = misfit.per_freedom / float(np.mean(scale**2)) <= misfit_limit(left)
     if not noisier and (pressed := pressed_priors(alone)):
         text = (
-            f"{excess_residuals(factor, bool(case.discrepancy))} with "
-            f"{'; '.join(pressed.values())}: widen these priors in [soil.prior], or the model "
-            "lacks an effect, or the noise is understated"
+            f"the soil is at ends of its priors: {'; '.join(pressed.values())}. Widen these priors "
+            "in [soil.prior], or the model lacks an effect, or the noise is understated"
         )
         return [Remark("soil-at-prior", text, tuple(pressed))]
     consequence = "no scatter from run to run accounts for them"
-    return [excess_residuals_remark(factor, case, consequence)]
+    return [excess_residuals_remark(misfit.factor, case, consequence)]
 
 
 def pressed_priors(fit: Solution) -> dict[str, str]:
@@ -110,84 +119,9 @@ def opened_priors(posterior: Posterior) -> tuple[Remark, ...]:
     if not best.hypothesis.wide_priors:
         return ()
     pressed = pressed_priors(posterior.soil.fit)
-    why = "Within them, a large remainder is left"
-    if pressed:
-        why = f"The fit reached {'; '.join(pressed.values())}"
-    text = f"the priors of the soil were opened. {why}"
+    why = f"within them, the fit has {'; '.join(pressed.values()) or 'a large remainder'}"
     if best.hypothesis.effects:
+        text = f"the priors of the soil were opened: {why}"
         return (Remark("prior-opened", text, tuple(pressed)),)
-    text += ". The soil alone then agrees with the rows"
-    return (Remark(OUTSIDE_PRIORS, text, tuple(pressed)),)
-
-
-def disagreements(posterior: Posterior) -> list[Remark]:
-    """What disagrees with what although no smooth gap was found; empty where nothing does."""
-    soil, terms = posterior.soil, posterior.terms
-    readings, at = terms.readings, soil.without.at
-    found = list[Remark]()
-    for name, scale in zip(readings.channels, terms.noise_scale(at), strict=True):
-        if scale >= NOISE_SCALED_UP:
-            text = (
-                f"readings of {column(name)} scatter {decimal(scale, 2)} times as much as their "
-                "declared noise"
-            )
-            found.append(Remark("noise-scaled", text, (column(name),)))
-    angle, bearing = terms.scatter(at)
-    if max(angle, bearing) >= UNUSUAL_RUN_EFFECT:
-        degrees = np.degrees(angle * SCATTER_UNITS["friction_angle"])
-        text = (
-            "runs differ from each other like soils whose friction angle varies by "
-            f"{degrees:.2g} deg and whose bearing strength "
-            f"varies by {bearing * SCATTER_UNITS['bearing']:.0%}"
-        )
-        found.append(Remark("runs-differ", text))
-    chosen = held_out_region(readings)
-    if chosen is not None:
-        found += _unpredicted_region(posterior, *chosen)
-    found += [
-        Remark("soil-test", f"the rows disagree with a test of the soil: {text}")
-        for text in disagreeing_soil_tests(soil.fit.case, soil.fit.values())
-    ]
-    return found
-
-
-def _unpredicted_region(posterior: Posterior, name: str, out: NDArray[np.bool_]) -> list[Remark]:
-    """The region that a fit to the other rows fails to predict, uncertainty of the fit included."""
-    soil = posterior.soil
-    found = conditional(soil.linear.without(soil.outliers | out), soil.without.at)
-    own = out & ~soil.outliers
-    residual = soil.linear.residual[own] - found.expected[own]
-    begin = f"the region {name} is not predicted by a fit to the other rows"
-    return _if_unlikely(begin, residual, found.joint(own))
-
-
-def unpredicted_rows(posterior: Posterior, readings: Readings, description: str) -> list[Remark]:
-    """Rows that took no part, where the soil alone fails to predict them.
-
-    Uncertainty of the fit is included, and noise and scatter of the rows themselves.
-    """
-    fit, at = posterior.soil.fit, posterior.soil.without.at
-    found = linearise(fit.case, fit.coordinates, fit.x, readings)
-    readings = readings.with_noise_at(found.prediction)
-    answered = np.isfinite(found.prediction) & np.isfinite(found.jacobian).all(axis=1)
-    if not answered.any():
-        return []
-    columns = scatter_columns(fit.fitted(), readings)
-    terms, own = terms_like(posterior.terms, at, readings, columns)
-    jacobian, scatter = found.jacobian[answered], terms.columns[answered]
-    covariance = posterior.soil.linear.evaluate(at).covariance
-    matrix = np.diag(terms.noise_std(own)[answered] ** 2) + jacobian @ covariance @ jacobian.T
-    matrix += (scatter * terms.variance(own)) @ scatter.T
-    residual = (readings.measured - found.prediction)[answered]
-    begin = f"{description}: these rows are not predicted by a fit to the other rows"
-    return _if_unlikely(begin, residual, matrix)
-
-
-def _if_unlikely(begin: str, residual: Floats, covariance: Floats) -> list[Remark]:
-    """A remark where residuals (k,) are too large for their covariance (k, k)."""
-    square = float(residual @ np.linalg.solve(covariance, residual))
-    if chi_square_tail(square, residual.size) >= REGION_LEVEL:
-        return []
-    size = decimal(square / residual.size, 2)
-    text = f"{begin}: mean squared residual {size} (1 is expected)"
-    return [Remark("region-not-predicted", text)]
+    text = f"a soil outside its priors explains the rows: {why}"
+    return (Remark("soil-outside-priors", text, tuple(pressed)),)

@@ -38,9 +38,6 @@ REGION_FRACTION = 0.3
 MOST_SLIP_LEVELS = 8
 #: Squared residual, in variances, of a prediction without equilibrium: ten standard deviations.
 INFEASIBLE_SQUARE = 100.0
-#: Mean squared residual of rows kept back that scatter of a few runs seldom leaves: of two runs,
-#: once in fifty times.
-UNEXPLAINED = 4.0
 
 
 @dataclass(frozen=True)
@@ -172,7 +169,7 @@ def predictive_gains(posterior: Posterior, sets: Sequence[Names], seed: int) -> 
 
     def density(node: Explanation) -> float:
         sums = [
-            sum(posterior.log_density(node, folds.fold == k) for k in folds.predicted)
+            sum(node.linear.log_density(node.at, folds.fold == k) for k in folds.predicted)
             for folds in counted
         ]
         return float(np.mean(sums))
@@ -282,22 +279,6 @@ def without_grown(
             text = f"the mean squared residual is {after} with and without {addition}"
         remarks.append(Remark("not-reduced", f"{g.description}: {text}", (name,), "note"))
     return {name: g for name, g in figures.items() if name not in grown}, remarks
-
-
-def unexplained_figures(figures: dict[str, GapReduction]) -> list[Remark]:
-    """A remark on each part of the rows that the soil alone, fitted to the others, leaves.
-
-    A verdict without a gap would contradict such a figure beside it.
-    """
-    return [
-        Remark(
-            "region-not-predicted",
-            f"{g.description}: mean squared residual {decimal(g.before, 2)} (1 is expected)",
-            (name,),
-        )
-        for name, g in figures.items()
-        if name != FITTED and g.before > UNEXPLAINED
-    ]
 
 
 def predict_held_out(

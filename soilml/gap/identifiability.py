@@ -3,55 +3,64 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.config.compatibility import check_wheel_size
 from soilml.errors import InputError, solvable
 from soilml.fitting.candidate_effects import candidate_effects
 from soilml.fitting.coordinates import free_soil_parameters
 from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.least_squares import SoilTestTerms
-from soilml.fitting.predictions import linearise
-from soilml.fitting.readings import Readings
+from soilml.fitting.operating_points import operating_points, with_rover_columns
+from soilml.fitting.predictions import forces, linearise
+from soilml.fitting.readings import Readings, positive_std
 from soilml.fitting.usable_readings import answered_rows
-from soilml.gap.planned_readings import expected_readings, joined_readings, planned_readings
 from soilml.gap.results import as_json_entry
-from soilml.gap.run_options import LUG_EFFECTS, check_costs, run_options
-from soilml.gap.scores import SignatureSimilarity
 from soilml.io.read_table import Rows, as_table
+from soilml.io.table import Table
+from soilml.numerics.subspaces import project_out
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
+from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
-from soilml.report.figure_style import AFTER, UNCHANGED
-from soilml.report.report import Picture, Report
+from soilml.report.report import Report
 from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
+from soilml.row_status import Status
 
-#: Approximate 95 % quantile of the largest score of the catalogue in data without a gap.
-DETECTION_THRESHOLD = 3.0
-#: 80 % quantile of the standard normal distribution: the power at which an effect is detectable.
-POWER_QUANTILE = 0.8416
-#: Separation, in sigma, from which an effect can be named, and below which two effects are
-#: indistinguishable.
-NAMEABLE_SIGMA, SAME_CLASS_SIGMA = 3.0, 2.0
-_MOST_RUNS = 5  # Runs to add that are listed
-LISTED_RIVALS = 3  # Rivals that are listed for each effect
+#: Approximate 95 % quantile of the largest score of the catalogue in data without a gap, and 80 %
+#: quantile of the standard normal distribution: the power at which an effect is detectable.
+DETECTION_THRESHOLD, POWER_QUANTILE = 3.0, 0.8416
+#: Separation, in sigma, from which an effect can be named.
+NAMEABLE_SIGMA = 3.0
 LEAST_LEFT = 1e-6  # Signal beside the soil, in sigma, up to which no size is detectable
 
 
 @dataclass(frozen=True)
-class AddedRun:
-    """A run that could be added: number of effects that could then be named, and the new ones."""
+class EffectIdentifiability:
+    """How well a design identifies one effect at its reference size."""
 
+    name: str
     kind: str
-    text: str
-    nameable: int
-    gained: tuple[str, ...]
-    cost: float | None = None
+    size: float  # reference size, in `unit`
+    unit: str
+    signal: float  # norm of the signature, in sigma
+    residual_signal: float  # norm that remains after the soil parameters have adapted, in sigma
+    absorbed: float  # fraction of the squared norm that the soil parameters absorb
+    rival: str  # the effect with the most similar signature; empty where there is no other
+    cosine: float  # between the two
+    separating_snr: float  # sigma, against the rival
+    detectable_size: float  # smallest size detected with a power of 80 %, in `unit`
+
+    @property
+    def nameable(self) -> bool:
+        """Whether the design distinguishes the effect from all others."""
+        return self.separating_snr >= NAMEABLE_SIGMA
 
 
 @dataclass(frozen=True, repr=False)
@@ -62,21 +71,15 @@ class Audit(Result):
     ----------
     effects : tuple of EffectIdentifiability
         The testable effects, the best identified first.
-    classes : tuple of tuple of str
-        Groups of effects that the design cannot distinguish at their reference sizes.
     untestable : dict of Remark
         Why the design cannot test an effect, by its name.
-    added_runs : tuple of AddedRun
-        Runs that could be added, the most useful first.
     """
 
     effects: tuple[EffectIdentifiability, ...]
-    classes: tuple[tuple[str, ...], ...]
     untestable: dict[str, Remark]
-    added_runs: tuple[AddedRun, ...]
 
     def report(self) -> Report:
-        """Which effects could be named, and the runs that would add most."""
+        """Which effects could be named."""
         return audit_report(self)
 
     def frame_columns(self) -> dict[str, Any]:
@@ -99,7 +102,6 @@ def audit(
     *,
     free: Sequence[str] | None = None,
     effects: Mapping[str, type[Effect]] = EFFECTS,
-    costs: Mapping[str, float] | None = None,
 ) -> Audit:
     """Determine which effects runs at the slips and loads of a design could identify.
 
@@ -116,9 +118,6 @@ def audit(
         Soil parameters that would be fitted; by default those with a prior.
     effects : mapping, optional
         The catalogue of effects by name.
-    costs : mapping, optional
-        Cost of each kind of run to add, 1 where none is given; they are then ranked by the effects
-        that they gain per cost.
 
     Raises
     ------
@@ -147,86 +146,44 @@ def audit(
     """
     case = case.without_explanations()
     effects = candidate_effects(case, effects)
-    known_costs = check_costs(costs or {})
-    design, _ = answered_rows(as_table(design))
-    readings = planned_readings(case, design)
+    rows, _ = answered_rows(as_table(design))
+    readings = planned_readings(case, rows)
     soil = free_soil_parameters(case, free)
     x = np.asarray([c.prior.fraction(c.nominal) for c in soil])
     of_tests = SoilTestTerms(case, soil).rates(x)
+    jacobian = linearise(case, soil, x, readings).jacobian / readings.std[:, None]
+    signatures, untestable = effect_signatures(case, readings, effects)
+    none = np.zeros(len(of_tests))
+    columns = {s.name: np.append(s.column / readings.std, none) for s in signatures}
+    table = identifiability(columns, np.vstack([jacobian, of_tests]), effects)
+    return Audit(tuple(sorted(table, key=lambda e: -e.separating_snr)), untestable)
 
-    def signals(*parts: tuple[Case, Readings]) -> tuple[dict[str, Floats], Floats]:
-        """Whitened signatures by name, and Jacobian of the soil, of the rows of some parts."""
-        found, jacobians = [], []
-        for number, (own, part) in enumerate(parts):
-            known = {n: e for n, e in effects.items() if not number or n not in LUG_EFFECTS}
-            columns = effect_signatures(own, part, known)[0]
-            found.append({s.name: s.column / part.std for s in columns})
-            jacobians.append(linearise(own, soil, x, part).jacobian / part.std[:, None])
-        none = [np.zeros(len(part)) for _, part in parts]
-        pooled = {}
-        for name in dict.fromkeys(name for own in found for name in own):
-            rows = [one.get(name, zero) for one, zero in zip(found, none, strict=True)]
-            pooled[name] = np.concatenate([*rows, np.zeros(len(of_tests))])
-        return pooled, np.vstack([*jacobians, of_tests])
 
-    def nameable(*parts: tuple[Case, Readings]) -> set[str]:
-        return {e.name for e in identifiability(*signals(*parts), effects) if e.nameable}
-
-    columns, jacobian = signals((case, readings))
-    table = identifiability(columns, jacobian, effects)
-    added_runs, before = [], {e.name for e in table if e.nameable}
-    for option in run_options(readings, case, list(effects)):
-        changed, known = option.changed(case), before
-        try:
-            new = expected_readings(option.at, readings, changed, option.kind)
-            if option.smooth:
-                extended = nameable((case, readings), (changed, new))
-            else:
-                extended = nameable((case, joined_readings(readings, new)))
-            if option.plain is not None:  # what a repeat gains is no gain of the covariate
-                repeat = expected_readings(option.plain, readings, case)
-                known = before | nameable((case, joined_readings(readings, repeat)))
-        except (InputError, np.linalg.LinAlgError):
-            continue
-        gained = sorted(extended - known)
-        cost = known_costs.get(option.kind, 1.0) if known_costs else None
-        count = len(before) + len(gained)
-        added_runs.append(AddedRun(option.kind, option.text, count, tuple(gained), cost))
-    added_runs.sort(key=lambda run: -len(run.gained) / (run.cost or 1.0))
-    return Audit(
-        effects=tuple(sorted(table, key=lambda e: -e.separating_snr)),
-        classes=indistinguishable_classes(columns, jacobian),
-        untestable=effect_signatures(case, readings, effects)[1],
-        added_runs=tuple(added_runs),
+def planned_readings(case: Case, design: Table) -> Readings:
+    """The readings that a case expects of a design, in the channels with declared noise."""
+    design = with_rover_columns(case, design)
+    check_wheel_size(case, design)
+    at = operating_points(design)
+    force = forces(case, at)
+    if np.any(force.status != 0):
+        row = int(np.flatnonzero(force.status)[0])
+        raise InputError(f"{design.place(row)}: {Status(int(force.status[row])).reason}")
+    expected = {column(name): np.asarray(getattr(force, name)) for name in CHANNELS}
+    filled = replace(design, columns={**design.columns, **expected})
+    stds = {name: positive_std(case, filled, column(name)) for name in CHANNELS}
+    names = [name for name, std in stds.items() if np.isfinite(std).all()]
+    if not names:
+        raise InputError("no channel has declared noise: give [noise] in the model file")
+    runs, number = np.unique(design["run"], return_inverse=True)
+    return Readings.of_every_row(
+        at,
+        names,
+        measured=np.concatenate([expected[column(n)] for n in names]),
+        std=np.concatenate([stds[n] for n in names]),
+        noise=[case.noise.get(column(n)) for n in names],
+        run=number.astype(np.int64),
+        runs=[str(r) for r in runs],
     )
-
-
-class Rival(NamedTuple):
-    """An effect with a similar signature, and the cosine between the two."""
-
-    name: str
-    cosine: float
-
-
-@dataclass(frozen=True)
-class EffectIdentifiability:
-    """How well a design identifies one effect at its reference size."""
-
-    name: str
-    kind: str
-    size: float  # reference size, in `unit`
-    unit: str
-    signal: float  # norm of the signature, in sigma
-    residual_signal: float  # norm that remains after the soil parameters have adapted, in sigma
-    absorbed: float  # fraction of the squared norm that the soil parameters absorb
-    rivals: tuple[Rival, ...]  # the most similar effects
-    separating_snr: float  # sigma, against the most similar effect
-    detectable_size: float  # smallest size detected with a power of 80 %, in `unit`
-
-    @property
-    def nameable(self) -> bool:
-        """Whether the design distinguishes the effect from all others."""
-        return self.separating_snr >= NAMEABLE_SIGMA
 
 
 def identifiability(
@@ -240,11 +197,11 @@ def identifiability(
     """
     if not columns:
         return []
-    similar, table = SignatureSimilarity.beside(jacobian, columns), []
-    for i, (name, column) in enumerate(columns.items()):
-        nearest = np.argsort(-similar.cosine[i])[:LISTED_RIVALS]
-        about, left = effects[name].about, float(similar.norm[i])
-        size, signal = about.reference[about.size], float(np.linalg.norm(column))
+    names, (norm, cosine) = list(columns), similarity(columns, jacobian)
+    table = []
+    for i, (name, own) in enumerate(columns.items()):
+        about, left, signal = effects[name].about, float(norm[i]), float(np.linalg.norm(own))
+        size, nearest = about.reference[about.size], int(np.argmax(cosine[i]))
         detectable = (DETECTION_THRESHOLD + POWER_QUANTILE) / max(left, 1e-300) * size
         table.append(
             EffectIdentifiability(
@@ -255,119 +212,56 @@ def identifiability(
                 signal=signal,
                 residual_signal=left,
                 absorbed=1.0 - (left / signal) ** 2,
-                rivals=tuple(
-                    Rival(similar.names[j], float(similar.cosine[i, j])) for j in nearest if j != i
-                ),
-                separating_snr=similar.separation(name, 1.0)[0],
+                rival=names[nearest] if nearest != i else "",
+                cosine=float(cosine[i, nearest]),
+                separating_snr=left * float(np.sqrt(max(0.0, 1.0 - cosine[i, nearest] ** 2))),
                 detectable_size=detectable if left > LEAST_LEFT else float("inf"),
             )
         )
     return table
 
 
-def indistinguishable_classes(
-    columns: Mapping[str, Floats], jacobian: Floats
-) -> tuple[tuple[str, ...], ...]:
-    """Effects that this design cannot distinguish at their reference sizes."""
-    from scipy.sparse.csgraph import connected_components
+def similarity(columns: Mapping[str, Floats], space: Floats) -> tuple[Floats, Floats]:
+    """Norms (k,) and absolute cosines (k, k), of zero diagonal, of whitened signatures (m,).
 
-    if not columns:
-        return ()
-    similar = SignatureSimilarity.beside(jacobian, columns)
-    weaker = np.minimum.outer(similar.norm, similar.norm)
-    sine = np.sqrt(np.maximum(0.0, 1.0 - similar.cosine**2))
-    alike = (weaker > SAME_CLASS_SIGMA) & (weaker * sine < SAME_CLASS_SIGMA)
-    _, label = connected_components(alike, directed=False)
-    groups = [
-        tuple(n for n, k in zip(columns, label, strict=True) if k == g) for g in np.unique(label)
-    ]
-    return tuple(sorted(g for g in groups if len(g) > 1))
+    space (m, p): Directions that are projected out of them.
+    """
+    projected = project_out(np.stack(list(columns.values()), axis=1), space)
+    norm = np.linalg.norm(projected, axis=0)
+    unit = projected / np.where(norm > 0, norm, 1.0)
+    cosine = np.abs(unit.T @ unit)
+    np.fill_diagonal(cosine, 0.0)
+    return norm, cosine
 
 
 def audit_report(found: Audit) -> Report:
-    """The report of an audit: which effects could be named, and the runs that would add most."""
-    named = [e.name for e in found.effects if e.nameable]
-    count = len(found.effects) + len(found.untestable)
-    gaining = [run for run in found.added_runs if run.gained]
-    verdict = f"These runs could name {len(named)} of {count} effects; no single run adds one."
-    if gaining:
-        kind = gaining[0].kind.replace("_", " ")
-        verdict = f"These runs could name {len(named)} of {count} effects; "
-        verdict += f"add {kind} to name {len(gaining[0].gained)} more."
-    effects = found.effects
-    tables = []
-    if gaining:
-        shown = gaining[:_MOST_RUNS]
-        tables.append(
-            ReportTable(
-                "Runs to add",
-                [
-                    Column("kind", [run.kind for run in shown]),
-                    Column("effects more", [len(run.gained) for run in shown]),
-                    Column("what", [f"{run.text}: {', '.join(run.gained)}" for run in shown]),
-                ],
-                "Effects that could then be named.",
-            )
-        )
-    if effects:
-        units = [e.unit for e in effects]
-        rivals = [", ".join(f"{n} {c:.2f}" for n, c in e.rivals[:1]) for e in effects]
-        tables.append(
-            ReportTable(
-                "Effects",
-                [
-                    Column("effect", [e.name for e in effects]),
-                    Column("nameable", [e.nameable for e in effects]),
-                    Column("left", [e.residual_signal for e in effects], digits=3),
-                    Column("apart", [e.separating_snr for e in effects], digits=3),
-                    Column("size", [e.size for e in effects], units, digits=3),
-                    Column("detectable", [e.detectable_size for e in effects], units,
-                           digits=2, sizes=[e.size for e in effects]),
-                    Column("absorbed", [e.absorbed for e in effects], "share", digits=2),
-                    Column("rival", rivals),
-                ],
-                "Signals in sigma at the reference size: left beside the soil, and apart from the "
-                "most similar effect. Absorbed: the share that the soil imitates.",
-            )
-        )  # fmt: skip
-    details = [("Effects that cannot be distinguished", [", ".join(c) for c in found.classes])]
-    details.append(
-        ("Effects that cannot be tested", [f"{n}: {why}" for n, why in found.untestable.items()])
-    )
+    """The report of an audit: which effects could be named."""
+    effects, units = found.effects, [e.unit for e in found.effects]
+    named = [e.name for e in effects if e.nameable]
+    count = len(effects) + len(found.untestable)
+    table = ReportTable(
+        "Effects",
+        [
+            Column("effect", [e.name for e in effects]),
+            Column("nameable", [e.nameable for e in effects]),
+            Column("left", [e.residual_signal for e in effects], digits=3),
+            Column("apart", [e.separating_snr for e in effects], digits=3),
+            Column("size", [e.size for e in effects], units, digits=3),
+            Column("detectable", [e.detectable_size for e in effects], units,
+                   digits=2, sizes=[e.size for e in effects]),
+            Column("absorbed", [e.absorbed for e in effects], "share", digits=2),
+            Column("rival", [f"{e.rival} {e.cosine:.2f}" if e.rival else "" for e in effects]),
+        ],
+        "Signals in sigma at the reference size: left beside the soil, and apart from the "
+        "most similar effect. Absorbed: the share that the soil imitates.",
+    )  # fmt: skip
+    untested = [f"{name}: {why}" for name, why in found.untestable.items()]
     return Report(
         kind="plan",
-        verdict=verdict,
+        verdict=f"These runs could name {len(named)} of {count} effects.",
         lines=[f"They could name: {', '.join(named)}."] if named else [],
-        tables=tables,
-        pictures=[_picture(found)] if effects else [],
-        details=[entry for entry in details if entry[1]],
+        tables=[table] if effects else [],
+        details=[("Effects that cannot be tested", untested)] if untested else [],
         status=f"{len(named)} of {count}",
         title="Effects that a design could name",
     )
-
-
-def _picture(found: Audit) -> Picture:
-    effects = found.effects
-
-    def draw(axes: Any) -> None:
-        panel, y = np.ravel(axes)[0], np.arange(len(effects))
-        left = [e.residual_signal for e in effects]
-        apart = [e.separating_snr for e in effects]
-        panel.barh(y - 0.19, left, 0.36, color=UNCHANGED, label="that the soil cannot imitate")
-        panel.barh(
-            y + 0.19, apart, 0.36, color=AFTER, label="that separates it from its nearest rival"
-        )
-        panel.axvline(NAMEABLE_SIGMA, color="black", lw=1.2)
-        panel.set_xscale("symlog", linthresh=1.0)
-        panel.set_xlim(left=0.0)
-        panel.xaxis.set_major_formatter("{x:g}")
-        panel.set_yticks(y, [e.name for e in effects])
-        panel.set_ylim(len(effects) - 0.5, -0.5)
-        panel.set_xlabel(
-            f"signal at the reference size, σ; line: {NAMEABLE_SIGMA:g} σ name an effect"
-        )
-        panel.legend(loc="lower right")  # the best separated stand above
-
-    size = (5.6, 1.0 + 0.34 * len(effects))
-    alt = "signal of each effect beside the soil, and beside its nearest rival"
-    return Picture("Signals of the effects", draw, 1, 1, size, alt)

@@ -1,35 +1,29 @@
-"""Runs and checks ranked by how well they would discriminate between explanations."""
+"""Runs and checks ranked by how well they would separate the explanations that remain."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.fitting.candidate_effects import effect_names
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.covariance import Whitening
 from soilml.fitting.least_squares import Solution
-from soilml.fitting.predictions import (
-    Linearisation,
-    linearise,
-    predict,
-)
+from soilml.fitting.predictions import Linearisation, linearise
 from soilml.fitting.readings import Readings
 from soilml.gap.decision import Decision
-from soilml.gap.planned_readings import readings_like, with_default_covariates
 from soilml.gap.results import NextRun, Suspect
-from soilml.gap.run_options import SENSOR_CHECKS, SOIL_TESTS, RunOption, run_options
-from soilml.gap.sentences import SUSPECTS_IN_LINE
+from soilml.gap.run_options import CHECKS, run_options, with_default_covariates
 from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import scatter_columns, terms_like
 from soilml.inference.posterior import Posterior
 from soilml.physics.operating_point import COVARIATES, Operating
-from soilml.quantities import column
+from soilml.quantities import QUANTITIES, column
 from soilml.report.numbers import LEAST_STATED
 
 #: Sigma at which a discrimination is capped: beyond it, more makes no practical difference.
@@ -38,12 +32,23 @@ MAX_DISCRIMINATION = 10.0
 MIN_DISCRIMINATION = 0.5
 #: Largest difference, in sigma of a reading, of two predictions that count as equal.
 SAME_PREDICTION = 0.1
-COMPARED = 5  # Explanations that are compared
-#: Relative singular value below which the rival's parameters cannot be determined by the rows.
-LEAST_SQUARES_TOLERANCE = 1e-10
+#: Explanations that are compared: suspects, or members of a class; and proposals that are listed.
+RIVALS, COMPARED, LISTED = 3, 5, 8
 
 #: Whitened difference (m,) of two explanations on some rows, and the rival's Jacobian (m, p).
 Difference = tuple[Floats, Floats]
+#: Columns of the rows of a run or check, by name.
+Rows = tuple[dict[str, float | str], ...]
+
+
+@dataclass(frozen=True)
+class _Proposal:
+    """A run or check: what it is, its rows, and how each rival differs on them from the first."""
+
+    kind: str
+    text: str
+    rows: Rows
+    differences: Sequence[Difference]
 
 
 def competing_explanations(
@@ -52,20 +57,14 @@ def competing_explanations(
     """The explanations to distinguish, the first one from the others: those that a report lists.
 
     They are those of a class; else the named one, or the first suspect, and the suspects after it
-    whose probability is stated. Where there is none, the next suspect is the rival, or the soil
-    alone.
+    whose probability is stated. Where there is none, the rival is the soil alone.
     """
-    ordered, count = list(decision.claimed), len(decision.claimed) - 1
-    if count < 1:
-        stated = [s.effects for s in listed if s.probability >= LEAST_STATED][:SUSPECTS_IN_LINE]
-        ordered = list(dict.fromkeys([*decision.listed[:1], *(s.effects for s in listed)]))
-        count = max(1, sum(names in stated for names in ordered[1:]))
-    if not ordered:
-        return []
-    rivals = [names for names in ordered[1:] if not set(ordered[0]) < set(names)]
-    nodes = [posterior.node_of(names) for names in [*ordered[:1], *rivals[:count]]]
-    found = [node for node in nodes if node is not None]
-    return found if len(found) > 1 else [*found, posterior.soil]
+    sets = list(decision.claimed)
+    if len(sets) < 2:
+        stated = [s.effects for i, s in enumerate(listed) if i < 2 or s.probability >= LEAST_STATED]
+        sets = list(dict.fromkeys([*decision.listed[:1], *stated]))[:RIVALS]
+    nodes = [node for names in sets if (node := posterior.node_of(names)) is not None]
+    return nodes if len(nodes) > 1 else [*nodes, posterior.soil]
 
 
 def next_runs(posterior: Posterior, explanations: Sequence[Explanation]) -> list[NextRun]:
@@ -73,180 +72,141 @@ def next_runs(posterior: Posterior, explanations: Sequence[Explanation]) -> list
 
     The discrimination is the expected increase, in sigma, of the misfit of a rival that adapts all
     its parameters to the present and the new rows together. With fewer than two explanations there
-    is nothing to discriminate. A run for which every explanation predicts what it predicts for a
-    plain repeat is left out.
+    is nothing to discriminate.
     """
     compared = explanations[:COMPARED]
     if len(compared) < 2:
         return []
-    readings = posterior.terms.readings
     fits = {"+".join(node.hypothesis.effects) or "soil alone": node.fit for node in compared}
     first, *rivals = fits.values()
-    effects = sorted({name for fit in fits.values() for name in effect_names(fit.case)})
-    white, expected = posterior.whiten, first.prediction
-    present = [_difference(white, expected, rival.linearisation) for rival in rivals]
-    options = run_options(readings, first.fitted(), effects)
-    proposals = []
-    for run, new in _differences(posterior, list(_expected(readings, fits, options))):
-        _, *others = run.fits.values()
+    present = [
+        _difference(posterior.whiten, first.linearisation, rival.linearisation) for rival in rivals
+    ]
+    sets = tuple(dict.fromkeys(node.hypothesis.effects for node in compared))
+    found = []
+    for one in (*_runs(posterior, fits), *_checks(fits)):
         try:
             sigmas = [
-                _discrimination(rival, old, _all_columns(rival, added, other))
-                for rival, other, old, added in zip(rivals, others, present, new, strict=True)
+                _discrimination(rival, old, new)
+                for rival, old, new in zip(rivals, present, one.differences, strict=True)
             ]
         except np.linalg.LinAlgError:
             continue
-        if np.isfinite(sigmas).all():
-            size, option = _mean_capped(sigmas), run.option
-            proposals.append(NextRun(option.kind, option.text, size, run.rows()))
-    for kind, (text, std_after) in SENSOR_CHECKS.items():
-        sigmas = [_check_discrimination(first, rival, std_after) for rival in rivals]
-        proposals.append(NextRun(kind, text, _mean_capped(sigmas), ()))
-    known = posterior.problem.effects
-    if any(name in known and known[name].about.kind == "soil" for name in effects):
-        proposals += _soil_tests(fits, present)
-    sets = tuple(dict.fromkeys(node.hypothesis.effects for node in compared))
-    useful = [
-        replace(run, compared=sets) for run in proposals if run.discrimination >= MIN_DISCRIMINATION
-    ]
-    return sorted(useful, key=lambda run: -run.discrimination)
+        size = float(np.mean(np.minimum(sigmas, MAX_DISCRIMINATION)))
+        if size >= MIN_DISCRIMINATION:  # that of a rival without an equilibrium is NaN
+            found.append(NextRun(one.kind, one.text, size, one.rows, sets))
+    return sorted(found, key=lambda run: -run.discrimination)[:LISTED]
 
 
-@dataclass(frozen=True)
-class _ExpectedRun:
-    """A run, the explanations on its gear, and what these predict, (fits, m)."""
-
-    option: RunOption
-    fits: Mapping[str, Solution]
-    readings: Readings
-    predicted: Floats
-
-    def rows(self) -> tuple[dict[str, float | str], ...]:
-        """Operating points and gear of the run with the prediction of each explanation."""
-        at, count = self.readings.at, len(self.readings.run)
-        columns: dict[str, Any] = {"slip": at.slip, "load_N": at.load}
-        columns |= {key: getattr(at, field) for field, key in COVARIATES.items()}
-        columns |= {"grouser_height_m": 0.0 if self.option.smooth else None}
-        for name, y in zip(self.fits, self.predicted, strict=True):
-            for i, channel in enumerate(self.readings.channels):
-                columns[f"{column(channel)} if {name}"] = y[self.readings.channel == i]
-        known = {k: np.broadcast_to(v, count) for k, v in columns.items() if v is not None}
-        found: list[dict[str, float | str]] = []
-        for r in range(count):
-            named = {} if at.gear is None else {"gear": str(at.gear[r])}
-            found.append(named | {key: float(values[r]) for key, values in known.items()})
-        return tuple(found)
-
-
-def _expected(
-    like: Readings, fits: Mapping[str, Solution], options: Iterable[RunOption]
-) -> Iterator[_ExpectedRun]:
-    """What the explanations predict for runs; those that they refuse, and repeats, are left out."""
-
-    def predicted(at: Operating, fit: Solution) -> Floats:
-        rows = Readings.of_every_row(with_default_covariates(at, fit.case), like.channels)
-        return np.asarray(predict(fit.case, fit.coordinates, fit.x[None, :], rows)[0])
-
-    for option in options:
-        changed = {name: _with_gear(fit, option) for name, fit in fits.items()}
-        ways = [option.at] if option.plain is None else [option.at, option.plain]
+def _runs(posterior: Posterior, fits: Mapping[str, Solution]) -> Iterator[_Proposal]:
+    """Runs that no explanation refuses, and that one at least tells from a plain repeat."""
+    like, first = posterior.terms.readings, next(iter(fits.values()))
+    for option in run_options(like, first.fitted()):
+        points = (option.at,) if option.plain is None else (option.at, option.plain)
         try:
-            y = np.asarray([[predicted(at, fit) for fit in changed.values()] for at in ways])
+            found = [_linearised(at, fit, like.channels) for at in points for fit in fits.values()]
         except InputError:
             continue
-        case = next(iter(changed.values())).case
-        readings = readings_like(option.at, like, case, y[0, 0], option.kind)
-        if len(y) == 1 or np.any(np.abs(y[0] - y[1]) > SAME_PREDICTION * readings.std):
-            yield _ExpectedRun(option, changed, readings, y[0])
-
-
-def _differences(
-    posterior: Posterior, runs: Sequence[_ExpectedRun]
-) -> Iterator[tuple[_ExpectedRun, list[Difference]]]:
-    """How the first explanation differs from the others in each run that none of them refuses."""
-
-    def linearised(run: _ExpectedRun, fit: Solution) -> Linearisation:
-        rows = replace(run.readings, at=with_default_covariates(run.readings.at, fit.case))
-        return linearise(fit.case, fit.coordinates, fit.x, rows)
-
-    for run in runs:
-        one, *others = run.fits.values()
+        here, plain = found[: len(fits)], found[len(fits) :]
+        readings = _readings_like(option.at, first.case, like, here[0].prediction)
+        least = SAME_PREDICTION * readings.std
+        if plain and all(
+            (np.abs(a.prediction - b.prediction) <= least).all()
+            for a, b in zip(here, plain, strict=True)
+        ):
+            continue
         try:
-            own = [linearised(run, fit) for fit in others]
-            columns = scatter_columns(one.fitted(), run.readings)
-            terms, at = terms_like(posterior.terms, posterior.noise, run.readings, columns)
-            whiten = terms.whiten(at, np.zeros(len(run.readings), bool))
-            yield run, [_difference(whiten, run.predicted[0], line) for line in own]
+            columns = scatter_columns(first.fitted(), readings)
+            terms, at = terms_like(posterior.terms, posterior.noise, readings, columns)
+            whiten = terms.whiten(at, np.zeros(len(readings), bool))
         except (InputError, np.linalg.LinAlgError):
             continue
+        differences = [_difference(whiten, here[0], line) for line in here[1:]]
+        predicted = {name: line.prediction for name, line in zip(fits, here, strict=True)}
+        yield _Proposal(option.kind, option.text, _rows_of_run(readings, predicted), differences)
 
 
-def _difference(whiten: Whitening, expected: Floats, rival: Linearisation) -> Difference:
-    change, jacobian = expected - rival.prediction, np.asarray(rival.jacobian)
-    return np.asarray(whiten @ change), np.asarray(whiten @ jacobian)
+def _linearised(at: Operating, fit: Solution, channels: Sequence[str]) -> Linearisation:
+    """The predictions of a fit for a run, with usual covariates where its effects need some."""
+    readings = Readings.of_every_row(with_default_covariates(at, fit.case), channels)
+    return linearise(fit.case, fit.coordinates, fit.x, readings)
 
 
-def _with_gear(fit: Solution, option: RunOption) -> Solution:
-    """The fit on the gear of a run; coordinates of effects that the gear has not are dropped."""
-    case = option.changed(fit.case)
-    if case is fit.case:
-        return fit
-    known = case.parameters()
-    kept = [i for i, c in enumerate(fit.coordinates) if c.path in known]
-    coordinates = tuple(fit.coordinates[i] for i in kept)
+def _readings_like(at: Operating, case: Case, like: Readings, measured: Floats) -> Readings:
+    """Measured values (m,) of a run, with the noise of known readings, else that of the case."""
+    stds = []
+    for i, own in enumerate(np.split(measured, len(like.channels))):
+        noise = like.noise[i] or case.noise.get(column(like.channels[i]))
+        typical = np.full(own.shape, np.median(like.std[like.channel == i]))
+        stds.append(np.maximum(typical if noise is None else noise.std(own), 1e-12))
     return replace(
-        fit, problem=replace(fit.problem, case=case, coordinates=coordinates), x=fit.x[kept]
+        Readings.of_every_row(with_default_covariates(at, case), like.channels),
+        measured=measured,
+        std=np.concatenate(stds),
+        noise=like.noise,
+        runs=("next",),
     )
 
 
-def _all_columns(fit: Solution, difference: Difference, changed: Solution) -> Difference:
-    """The difference with the Jacobian of all coordinates of a fit: 0 for those dropped."""
-    paths = [c.path for c in fit.coordinates]
-    jacobian = np.zeros((len(difference[0]), len(paths)))
-    jacobian[:, [paths.index(c.path) for c in changed.coordinates]] = difference[1]
-    return difference[0], jacobian
+def _rows_of_run(readings: Readings, predicted: Mapping[str, Floats]) -> Rows:
+    """Operating points and gear of a run with the prediction of each explanation."""
+    at, count = readings.at, len(readings.run)
+    columns: dict[str, Any] = {"gear": at.gear, "slip": at.slip, "load_N": at.load}
+    columns |= {key: getattr(at, field) for field, key in COVARIATES.items()}
+    for name, y in predicted.items():
+        for i, channel in enumerate(readings.channels):
+            columns[f"{column(channel)} if {name}"] = y[readings.channel == i]
+    known = {k: np.broadcast_to(v, count).tolist() for k, v in columns.items() if v is not None}
+    return tuple(
+        dict(zip(known, values, strict=True)) for values in zip(*known.values(), strict=True)
+    )
 
 
-def _soil_tests(fits: Mapping[str, Solution], present: Sequence[Difference]) -> Iterator[NextRun]:
-    """Tests of the soil, of parameters that the explanations free."""
+def _difference(whiten: Whitening, first: Linearisation, rival: Linearisation) -> Difference:
+    change = first.prediction - rival.prediction
+    return np.asarray(whiten @ change), np.asarray(whiten @ rival.jacobian)
+
+
+def _checks(fits: Mapping[str, Solution]) -> Iterator[_Proposal]:
+    """Checks of sensors and tests of the soil that measure what some explanation frees."""
     first, *rivals = fits.values()
     values = {name: fit.values() for name, fit in fits.items()}
-    for kind, (text, stds) in SOIL_TESTS.items():
-        names = [c.path for c in first.coordinates if c.path in stds]
-        if names:
-            own = {k: stds[k] for k in names}
-            sigmas = [
-                _discrimination(rival, old, _soil_difference(first, rival, own))
-                for rival, old in zip(rivals, present, strict=True)
-            ]
+    for kind, (text, stds) in CHECKS.items():
+        free = {path: std for path, std in stds.items() if any(path in v for v in values.values())}
+        if free:
             row: dict[str, float | str] = {
-                f"{column(k)} if {n}": v[k] for n, v in values.items() for k in names if k in v
+                f"{column(path) if path in QUANTITIES else path} if {name}": own[path]
+                for name, own in values.items()
+                for path in free
+                if path in own
             }
-            yield NextRun(kind, text, _mean_capped(sigmas), (row,))
+            differences = [_difference_of_parameters(first, rival, free) for rival in rivals]
+            yield _Proposal(kind, text, (row,), differences)
 
 
-def _soil_difference(
-    first: Solution, rival: Solution, stds: Mapping[str, tuple[float, bool]]
+def _difference_of_parameters(
+    first: Solution, rival: Solution, stds: Mapping[str, float | str]
 ) -> Difference:
-    """Whitened difference of two explanations in the soil parameters that a test determines."""
-    own, others = first.values(), rival.values()
+    """Whitened difference of two explanations in the parameters that a check measures.
+
+    An effect that an explanation lacks has the size zero in it.
+    """
     difference, jacobian = np.zeros(len(stds)), np.zeros((len(stds), len(rival.x)))
     rates = rates_at(rival.coordinates, rival.x)
-    for i, (name, (std, is_relative)) in enumerate(stds.items()):
-        std = std * abs(own[name]) if is_relative else std
-        # a parameter that the rival does not free has the value of its case
-        there = others[name] if name in others else float(getattr(rival.case.soil, name))
-        difference[i] = (own[name] - there) / std
-        jacobian[i] = [
-            rate / std if c.path == name else 0.0
-            for c, rate in zip(rival.coordinates, rates, strict=True)
-        ]
+    for i, (path, given) in enumerate(stds.items()):
+        own, other = (_value(fit, path) for fit in (first, rival))
+        share = float(given.removesuffix(" %")) / 100.0 if isinstance(given, str) else 0.0
+        std = share * abs(own) if isinstance(given, str) else given
+        difference[i] = (own - other) / std
+        jacobian[i] = np.where([c.path == path for c in rival.coordinates], rates / std, 0.0)
     return difference, jacobian
 
 
-def _mean_capped(sigmas: Sequence[float]) -> float:
-    """Mean discrimination from the rivals, each capped at `MAX_DISCRIMINATION`."""
-    return float(np.mean(np.minimum(sigmas, MAX_DISCRIMINATION)))
+def _value(fit: Solution, path: str) -> float:
+    """The value of a parameter in an explanation; zero for the size of an effect it has not."""
+    known = fit.case.parameters()
+    fixed = float(known[path][1]) if path in known else 0.0
+    return fit.values().get(path, fixed)
 
 
 def _discrimination(rival: Solution, present: Difference, new: Difference) -> float:
@@ -266,16 +226,5 @@ def _adapted_misfit(rival: Solution, parts: Sequence[Difference]) -> float:
     jacobian = np.vstack([*[j for _, j in parts], prior, tests.rates(rival.x)])
     if not (np.isfinite(difference).all() and np.isfinite(jacobian).all()):
         return float("nan")
-    step = np.linalg.lstsq(jacobian, difference, rcond=LEAST_SQUARES_TOLERANCE)[0]
+    step = np.linalg.lstsq(jacobian, difference, rcond=1e-10)[0]
     return float(np.sum((difference - jacobian @ step) ** 2))
-
-
-def _check_discrimination(first: Solution, rival: Solution, std_after: dict[str, float]) -> float:
-    """Sigma by which a check of the sensors would reject one of two explanations."""
-    sizes = [
-        abs(value) / std_after[c.effect]
-        for fit in (first, rival)
-        for c, value in zip(fit.coordinates, fit.values().values(), strict=True)
-        if c.effect in std_after and not c.is_shape
-    ]
-    return max(sizes, default=0.0)

@@ -1,26 +1,20 @@
-"""Notes on an analysis: outliers, estimates at a bound, noise, what one channel may hide."""
+"""Notes on an analysis: outliers, bounds, noise, and what these runs cannot tell apart."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from soilml.errors import InputError
-from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.least_squares import Solution
-from soilml.fitting.predictions import linearise
-from soilml.fitting.readings import Readings
-from soilml.gap.scores import chi_square_tail
+from soilml.gap.results import GapReport
 from soilml.gap.sentences import outliers_in_words
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
-from soilml.numerics.prior import Prior
-from soilml.numerics.subspaces import project_out
 from soilml.quantities import column
 from soilml.remarks import Remark
-from soilml.report.numbers import channel_name, decimal, format_quantity
+from soilml.report.numbers import channel_name, decimal
 
 LISTED_OUTLIERS = 6  # Outliers that a note lists by name
 NOTABLE_NOISE_SCALE = 1.25  # Factor on the declared noise above which a note is made
@@ -28,11 +22,9 @@ NOTABLE_NOISE_SCALE = 1.25  # Factor on the declared noise above which a note is
 SIGNIFICANCE = 0.01
 #: Distance from a bound, as a fraction of the range, at which an estimate counts as at the bound.
 AT_BOUND = 1e-3
-#: Sizes of effects, in usual ones, up to which they are plausible, and the normal quantile of the
-#: power with which they are found, and score from which one is, among all of the catalogue.
-PLAUSIBLE_SIZE, POWER_80, DETECTED = 3.0, 0.84, 3.0
-#: Changes of pull (N) and sinkage (m) below which they are not stated.
-NOTABLE_CHANGE = {"drawbar_pull": 0.01, "sinkage": 1e-5}
+#: Change of the readings by an effect of usual size, in sigma, from which it is visible on a known
+#: soil, and what another soil leaves of it, below which it is not.
+VISIBLE, UNSEEN = 6.0, 2.0
 
 
 def analysis_notes(
@@ -56,8 +48,6 @@ def analysis_notes(
             f"with the soil alone, the rows disagree with a test of the soil: {text}; part of the "
             "gap lies there, unless the test was made on another soil",
         )
-    if written.hypothesis.wide_priors:
-        yield from _beyond_priors(posterior.problem.case.prior, written.fit)
     pairs = zip(written.fit.coordinates, written.fit.x, strict=True)
     ends = [c.path for c, x in pairs if not c.effect and min(x, 1.0 - x) < AT_BOUND]
     if ends:
@@ -88,36 +78,21 @@ def outlier_names(posterior: Posterior, place: Callable[[int], str]) -> tuple[st
     )
 
 
-def _beyond_priors(given: Mapping[str, Prior], fit: Solution) -> Iterator[Remark]:
-    """A note on a soil in model.toml that the given priors, by path, exclude."""
-    values, beyond = fit.values(), {}
-    for c in fit.coordinates:
-        value, prior = values[c.path], given.get(c.path)
-        if c.effect or (prior is not None and prior.lower <= value <= prior.upper):
-            continue
-        where = f"given as {format_quantity(c.nominal, c.unit)}"
-        if prior is not None:
-            ends = (format_quantity(end, c.unit) for end in (prior.lower, prior.upper))
-            where = f"prior {' to '.join(ends)}"
-        beyond[c.path] = f"{c.name.replace('_', ' ')} {format_quantity(value, c.unit)} ({where})"
-    if beyond:
-        text = f"the soil in model.toml is outside the given priors: {', '.join(beyond.values())}"
-        yield Remark("beyond-priors", text, tuple(beyond))
-
-
 def _large_noise(posterior: Posterior, soil: Solution) -> Iterator[Remark]:
     """Notes on channels whose residuals about the soil alone are too small for their noise.
 
     Their squares are nearly chi-squared, with the channel's share of the degrees of freedom: a gap,
     or scatter of the soil, only makes them larger.
     """
+    from scipy.special import chdtr
+
     readings = posterior.terms.readings
     left = 1.0 - len(soil.x) / len(readings)
     for i, name in enumerate(readings.channels):
         own = readings.channel == i
         residual = (readings.measured - soil.prediction)[own] / readings.std[own]
         squares, freedom = float(residual @ residual), left * float(own.sum())
-        by_chance = 1.0 - chi_square_tail(squares, freedom)
+        by_chance = float(chdtr(freedom, squares))
         if squares > 0.0 and by_chance < SIGNIFICANCE / len(readings.channels):
             text = (
                 f"the noise of {column(name)}, with that of slip and load, is declared "
@@ -127,55 +102,68 @@ def _large_noise(posterior: Posterior, soil: Solution) -> Iterator[Remark]:
             yield Remark("noise-too-large", text, (column(name),))
 
 
-def hidden_effect(posterior: Posterior, soil: Solution) -> Iterator[Remark]:
-    """Of one channel: the effect of soil or gear that could hide in it and change the others most.
+def one_channel(posterior: Posterior) -> Iterator[Remark]:
+    """Of one channel: the effects that would change others alone."""
+    channels = posterior.terms.readings.channels
+    hidden = [name for name, why in posterior.untestable.items() if why.code == "no-change"]
+    if len(channels) == 1 and hidden:
+        measured = channel_name(column(channels[0]))
+        text = f"only {measured} was measured: {', '.join(hidden)} would not show"
+        yield Remark("hidden-effect", text, tuple(hidden), "note")
 
-    At the size whose score is `DETECTED` with a probability of 80 %, and at most three usual sizes;
-    the soil changes as far as it would to hide the effect.
+
+def indistinct(report: GapReport, posterior: Posterior, fixed: Sequence[str]) -> list[Remark]:
+    """Conclusions that these runs do not support, since something else would look the same.
+
+    fixed: Names of parameters that were fixed.
     """
-    effects, readings = posterior.problem.effects, posterior.terms.readings
-    if len(readings.channels) != 1:
-        return
-    measured = readings.channels[0]
-    names = tuple(n for n in ("drawbar_pull", "sinkage") if n != measured)
-    white = soil.whitened_by(posterior.whiten)
-    tested = {s.name: np.asarray(posterior.whiten @ s.column) for s in posterior.signatures}
-    unseen = [n for n, why in posterior.untestable.items() if why.code == "no-change"]
-    sizes = dict.fromkeys(unseen, PLAUSIBLE_SIZE)
-    for name, own in tested.items():
-        norm = float(np.linalg.norm(project_out(own[:, None], white.jacobian)))
-        sizes[name] = min((DETECTED + POWER_80) / max(norm, 1e-300), PLAUSIBLE_SIZE)
-    kept = {n: e for n, e in effects.items() if n in sizes and e.about.kind in ("soil", "wheel")}
-    std = np.full(len(readings.row_slip) * len(names), 1e-9)
-    others = Readings.of_every_row(readings.at, names, std=std)
-    try:
-        found, _ = effect_signatures(soil.fitted(), others, kept)
-    except InputError:
-        return
-    rates = linearise(soil.case, soil.coordinates, soil.x, others).jacobian
-    most, worst, change = 0.0, "", np.zeros(len(names))
-    for s in found:
-        own = s.column
-        if s.name in tested:
-            moved = np.linalg.solve(white.information, white.jacobian.T @ tested[s.name])
-            own = own - rates @ moved
-        own = np.abs(sizes[s.name] * np.nan_to_num(own))
-        share = float((own / others.load)[others.channel == 0].max())
-        cap = max(share, 1.0)  # no wheel pulls more than its load
-        sizes[s.name] /= cap
-        if share / cap > most:
-            largest = [own[others.channel == i].max() / cap for i in range(len(names))]
-            most, worst, change = share / cap, s.name, np.asarray(largest)
-    told = [
-        f"{channel_name(column(n))} by {decimal(1e3 * x if n == 'sinkage' else x, 2)} "
-        f"{'mm' if n == 'sinkage' else 'N'}"
-        for n, x in zip(names, change, strict=True)
-        if x > NOTABLE_CHANGE[n]
-    ]
-    if told:
+    found = like_another_soil(posterior, posterior.soil.fit)
+    found += like_another_force(posterior, report.first)
+    if fixed and report.status not in ("no-gap", "undecided"):
         text = (
-            f"only {channel_name(column(measured))} was measured: {worst} at "
-            f"{decimal(sizes[worst], 2)} times its usual size would not show, and would change "
-            f"{' and '.join(told)}"
+            f"that {', '.join(fixed)} in the model file are correct: they were fixed. An error in "
+            "them appears as an effect: free them with a prior or with --free"
         )
-        yield Remark("hidden-effect", text, (worst,), "note")
+        found.append(Remark("fixed-parameters", text, tuple(fixed)))
+    return found
+
+
+def like_another_soil(posterior: Posterior, soil: Solution) -> list[Remark]:
+    r"""The effects of usual size that a change of the soil imitates.
+
+    .. math:: \Delta x = (X^T V^{-1} X + P)^{-1} X^T V^{-1} s
+
+    with the signature s, the Jacobian X of the soil and its prior precision P: what is left, in
+    sigma, is the norm of :math:`s - X \Delta x`. References: omitted variables; Greene,
+    Econometric Analysis, 7th ed., section 4.3.2.
+    """
+    soil, alike = soil.whitened_by(posterior.whiten), []
+    for s in posterior.signatures:
+        whole = np.asarray(posterior.whiten @ s.column)
+        change = np.linalg.solve(soil.information, soil.jacobian.T @ whole)
+        left = float(np.linalg.norm(whole - soil.jacobian @ change))
+        if float(np.linalg.norm(whole)) >= VISIBLE and left < UNSEEN:
+            alike.append(s.name)
+    if not alike:
+        return []
+    text = f"that {', '.join(alike)} are absent: at usual size, these runs cannot tell them from "
+    return [Remark("like-another-soil", f"{text}another soil", tuple(alike))]
+
+
+def like_another_force(posterior: Posterior, names: Sequence[str]) -> list[Remark]:
+    """Of the effects of a cause, those that change the drawbar pull alone, where more was measured.
+
+    Any force along the travel direction has such a signature, by whatever law it grows.
+    """
+    if len(posterior.terms.readings.channels) == 1:
+        return []
+    text = (
+        "that {} is the force that is missing: it changes the drawbar pull alone, as the drag of a "
+        "cable or of the carriage does"
+    )
+    return [
+        Remark("like-another-force", text.format(name), (name,))
+        for name in names
+        if posterior.only_channel.get(name) == "drawbar_pull"
+        and posterior.problem.effects[name].about.kind != "sensor"
+    ]

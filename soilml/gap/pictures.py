@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from soilml.gap.results import GapReduction, GapReport
 
 _SIGNIFICANT = 0.05  # Family-wise p value below which a region is marked
-_MOST_SCORE = 30.0  # Score of the darkest colour, sigma
+_MOST_SCORE, _DARK = 30.0, 8.0  # Score of the darkest colour, and from which it is dark, in sigma
 #: Red where measured above the model, blue below; texts keep their colour on them in a dark page.
 _MAP, _TEXT = "RdBu_r", ("#010101", "#fdfdfd")
 
@@ -34,7 +34,7 @@ _MAP, _TEXT = "RdBu_r", ("#010101", "#fdfdfd")
 def map_picture(found: GapReport) -> Picture:
     """Scores of regions of slip and load against the soil alone, a panel for each channel."""
     channels = list(dict.fromkeys(region.channel for region in found.where))
-    worst = max(found.where, key=lambda region: abs(region.z) if math.isfinite(region.z) else 0.0)
+    worst = found.where[0]
     alt = (
         f"scores by slip and load; the largest is {significant(worst.z, 2)} sigma, "
         f"{channel_name(worst.channel)} at slip {format_range(*worst.slip)} and "
@@ -50,29 +50,26 @@ def map_picture(found: GapReport) -> Picture:
 
 
 def _draw_map(found: GapReport, channels: list[str], axes: Any) -> None:
-    from matplotlib import colormaps
+    from matplotlib.colors import SymLogNorm
 
     slips = sorted({region.slip for region in found.where})
     loads = sorted({region.load_N for region in found.where})
+    scale = SymLogNorm(1.0, vmin=-_MOST_SCORE, vmax=_MOST_SCORE, clip=True)
     for channel, panel in zip(channels, axes.flat, strict=True):
+        grid = np.full((len(loads), len(slips)), np.nan)
         for region in (one for one in found.where if one.channel == channel):
             i, k = slips.index(region.slip), loads.index(region.load_N)
-            z = region.z if math.isfinite(region.z) else 0.0
-            share = min(math.log1p(abs(z)) / math.log1p(_MOST_SCORE), 1.0)
-            colour = colormaps[_MAP](0.5 + 0.5 * math.copysign(share, z))
-            panel.fill_between([i - 0.49, i + 0.49], k - 0.48, k + 0.48, color=colour, lw=0)
+            grid[k, i] = region.z
             text = f"{'*' if region.p < _SIGNIFICANT else ''}{significant(region.z, 2)}"
-            ink = _TEXT[int(share > 0.6)]
+            ink = _TEXT[int(abs(region.z) > _DARK)]
             panel.text(i, k, pretty(text), ha="center", va="center", color=ink, fontsize=10)
+        panel.imshow(grid, cmap=_MAP, norm=scale, origin="lower", aspect="auto")
         panel.set_title(channel_name(channel))
         panel.grid(visible=False)
-        panel.set_xlim(-0.5, len(slips) - 0.5)
-        panel.set_ylim(-0.5, len(loads) - 0.5)
-        ends = [format_range(*slip, digits=2) for slip in slips]
-        panel.set_xticks(range(len(slips)), [end.replace(" to ", "–") for end in ends], fontsize=8)
-        panel.set_yticks(
-            range(len(loads)), [format_range(*load).replace(" to ", "–") for load in loads]
-        )
+        ends = [format_range(*slip, digits=2).replace(" to ", "–") for slip in slips]
+        panel.set_xticks(range(len(slips)), ends, fontsize=8)
+        ends = [format_range(*load).replace(" to ", "–") for load in loads]
+        panel.set_yticks(range(len(loads)), ends)
         panel.set_xlabel("slip")
         panel.set_ylabel("load, N")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
@@ -17,11 +18,11 @@ from soilml.fitting.least_squares import Solution
 from soilml.fitting.levels import Levels
 from soilml.fitting.readings import Readings
 from soilml.gap.results import RegionScore, RemainingDiscrepancy
-from soilml.gap.scores import family_wise_p, scores
 from soilml.inference.constants import INTERVAL_FACTOR
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
 from soilml.numerics.prior import UNIFORM_PRECISION
+from soilml.numerics.subspaces import project_out
 from soilml.quantities import QUANTITIES, column
 from soilml.report.numbers import decimal, shown_unit
 
@@ -31,7 +32,6 @@ LEAST_AMPLITUDE = 0.1
 MOST_LOG_VARIANCE = 0.5
 #: Bins along slip and along load of the discrepancy map at most, and readings that a region needs.
 SLIP_BINS, LOAD_BINS, MIN_READINGS = 4, 3, 2
-MOST_LEFT_OUT = 0.1  # Share of the readings in regions with too few for which fewer bins are made
 #: Variance of the process that the points may leave out anywhere at the readings, as a fraction of
 #: it and, where that is less, of the variance of the noise.
 LEFT_OUT, LEFT_OUT_OF_NOISE = 1e-3, 0.04
@@ -92,23 +92,36 @@ def discrepancy_amplitudes(
 
 
 def discrepancy_map(posterior: Posterior, soil: Solution) -> list[RegionScore]:
-    """Score of each region of the data against the fit of the soil alone, the largest first.
+    r"""Score of each region of the data against the fit of the soil alone, the largest first.
 
-    The score is positive where the mean reading is above the prediction. Outliers count in none.
+    .. math:: z_i = g_{\perp i} \cdot r / |g_{\perp i}|
+
+    with whitened residuals r, and a common shift g of the readings of the region, whitened and
+    without what the soil can imitate. Its sign is that of the mean residual. Outliers count in
+    none. p is the probability that the largest of so many independent normal scores is as far from
+    zero; correlated scores make it an upper bound.
+
+    References: Rao, Proc. Cambridge Phil. Soc. 44, 1948; Sidak, Journal of the American Statistical
+    Association 62, 1967.
     """
     readings, std, whiten = posterior.terms.readings, posterior.std, posterior.whiten
     parts = regions(readings)
     if not parts:
         return []
-    columns = np.stack([np.where(inside, std, 0.0) for *_, inside in parts], axis=1)
     fit = soil.whitened_by(whiten)
-    z = np.abs(scores(fit.residual, np.asarray(whiten @ columns), fit.jacobian))
+    shifts = np.stack([np.where(inside, std, 0.0) for *_, inside in parts], axis=1)
+    white = np.asarray(whiten @ shifts)
+    left = project_out(white, fit.jacobian)
+    norm = np.linalg.norm(left, axis=0)
+    seen = norm > 1e-4 * np.maximum(np.linalg.norm(white, axis=0), 1e-300)
+    z = np.where(seen, np.abs(left.T @ fit.residual) / np.where(seen, norm, 1.0), 0.0)
     standardised = (readings.measured - fit.prediction) / std
     found = []
     for i in np.argsort(-z, kind="stable"):
         channel, slip, load, inside = parts[i]
-        signed = float(np.copysign(z[i], np.mean(standardised[inside])))
-        p = family_wise_p(float(z[i]), len(parts))
+        signed = math.copysign(z[i], np.mean(standardised[inside]))
+        p = -np.expm1(len(parts) * np.log1p(-math.erfc(z[i] / math.sqrt(2.0))))
+        p = max(float(p), float(np.finfo(float).tiny))
         found.append(RegionScore(column(channel), slip, load, signed, p))
     return found
 
@@ -118,28 +131,16 @@ Region = tuple[str, tuple[float, float], tuple[float, float], NDArray[np.bool_]]
 
 
 def regions(readings: Readings) -> list[Region]:
-    """Channel by slip bin by load bin, those with enough readings.
-
-    In as many slip bins as leave no more than `MOST_LEFT_OUT` of the readings in none.
-    """
-
-    def of(slip_bins: int) -> list[Region]:
-        slips = _bins(readings.slip, readings.slip_levels, slip_bins)
-        loads = _bins(readings.load, readings.load_levels, LOAD_BINS)
-        found = []
-        for (i, name), slip, load in product(enumerate(readings.channels), slips, loads):
-            inside = (readings.channel == i) & (slip[0] <= readings.slip)
-            inside &= (readings.slip <= slip[1]) & (load[0] <= readings.load)
-            inside &= readings.load <= load[1]
-            if inside.sum() >= MIN_READINGS:
-                found.append((name, slip, load, inside))
-        return found
-
-    def excess(parts: list[Region]) -> float:
-        inside = sum(int(own[-1].sum()) for own in parts)
-        return max(1.0 - inside / len(readings), MOST_LEFT_OUT)
-
-    return min((of(count) for count in range(SLIP_BINS, 0, -1)), key=excess)
+    """Channel by slip bin by load bin, those with enough readings."""
+    slips = _bins(readings.slip, readings.slip_levels, SLIP_BINS)
+    loads = _bins(readings.load, readings.load_levels, LOAD_BINS)
+    found = []
+    for (i, name), slip, load in product(enumerate(readings.channels), slips, loads):
+        inside = (readings.channel == i) & (slip[0] <= readings.slip) & (readings.slip <= slip[1])
+        inside &= (load[0] <= readings.load) & (readings.load <= load[1])
+        if inside.sum() >= MIN_READINGS:
+            found.append((name, slip, load, inside))
+    return found
 
 
 def _bins(values: Floats, levels: Levels, count: int) -> list[tuple[float, float]]:

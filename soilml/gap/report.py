@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from soilml.gap.checks import MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS
 from soilml.gap.pictures import bars_picture, map_picture, remainder_picture
 from soilml.gap.results import GapReport
 from soilml.gap.sentences import needed_sizes
@@ -22,7 +21,6 @@ from soilml.report.tables import Column, ReportTable
 #: Statuses whose advice is to make the first of the next runs.
 _ADVISES_NEXT_RUN = ("suspected", "partly-named", "named", "class")
 _LISTED = 6  # Explanations that are listed
-_MOST_SIGMA = 10.0  # Discrimination beyond which only this bound is stated
 #: Names of the parts of the rows, by those of the figures in gap.json.
 PARTS = {
     "train": "fitted rows",
@@ -30,36 +28,14 @@ PARTS = {
     "held_out_region": "held-out region",
     "held_out_slips": "held-out slips",
 }
-_NEEDED = (
-    "At least one of torque, drawbar pull and sinkage, with readings that vary.",
-    "The noise of each: [noise] in the model file, a column such as torque_Nm_std, or repeats.",
-    f"At least {MIN_RESIDUAL_READINGS} readings more than free soil parameters, copies apart.",
-    f"To name a cause: at least {NAMING_RESIDUAL_READINGS} readings more, two runs, two loads and "
-    "three slips.",
-)
-_COMPONENTS = {
-    "friction_angle_std": ("friction angle from run to run, std", "rad"),
-    "bearing_std": ("bearing strength from run to run, std", "share"),
-    "autocorrelation": ("correlation of neighbouring samples", "1"),
-}
-_NOTATION = (
-    (
-        "gap",
-        "mean of ((measured - predicted) / sigma)^2, where sigma is the standard deviation of the "
-        "reading from sensor noise and run-to-run variation; noise alone gives 1.",
-    ),
-    ("held out", "the model is refitted without the runs, or the region, that it then predicts."),
-    ("sigma, +-", "one standard deviation."),
-)
 
 
 def gap_report(found: GapReport, title: str = "Gap between model and measurements") -> Report:
     """The report of a gap analysis: verdict, readings beside the model, where, how large, what."""
     untested = [f"{name}: {why.text}" for name, why in found.untestable.items()]
     details: list[tuple[str, Sequence[str]]] = [
-        ("What an analysis needs", _NEEDED if found.status == "bad-data" else ()),
         ("Why no cause is certain", texts(found.reasons)),
-        ("Conclusions that this report does not support", texts(found.not_claimed)),
+        ("What these runs do not support", texts(found.not_claimed)),
         ("Effects that these runs cannot test", untested),
     ]
     status = STATUSES[found.status]
@@ -80,7 +56,6 @@ def gap_report(found: GapReport, title: str = "Gap between model and measurement
         tone=status.tone,
         title=title,
         basis=f"{status.meaning}; seed {found.seed}",
-        notation=_NOTATION if found.gap else (),
     )
 
 
@@ -91,7 +66,7 @@ def shown_model(found: GapReport) -> str:
         return f"with {names}, the likeliest of {len(found.cause_set)} explanations"
     if names:
         return f"with {names}"
-    return f"with {' + '.join(found.best_unclaimed) or 'the best candidate'}, which is not claimed"
+    return f"with {' + '.join(found.first) or 'the best candidate'}, which is not claimed"
 
 
 def _parameters(found: GapReport) -> ReportTable | None:
@@ -109,7 +84,7 @@ def _parameters(found: GapReport) -> ReportTable | None:
         sizes=columns["mean"],
     )
     note = f"The soil {shown_model(found)}; 'soil alone' is biased where an effect is missing."
-    if not found.effects and not found.best_unclaimed:
+    if not found.first:
         note = "The soil beside a smooth discrepancy of unknown cause, and alone."
     return ReportTable.of_parameters("Soil and effects", columns, note, **{"soil alone": alone})
 
@@ -124,14 +99,14 @@ def _tables(found: GapReport) -> Iterator[ReportTable]:
     if found.next_runs:
         yield _next_runs(found)
     if found.soil_tests:
-        tests, units = found.soil_tests, [test.unit for test in found.soil_tests]
+        tests, units = found.soil_tests, [test["unit"] for test in found.soil_tests]
         yield ReportTable(
             "Tests of the soil",
             [
-                Column("test", [t.label for t in tests]),
-                Column("measured", [t.measured for t in tests], units, digits=3),
-                Column("soil alone, sigma off", [t.sigma_before for t in tests], digits=2),
-                Column("soil after, sigma off", [t.sigma_after for t in tests], digits=2),
+                Column("test", [t["label"] for t in tests]),
+                Column("measured", [t["measured"] for t in tests], units, digits=3),
+                Column("soil alone, sigma off", [t["sigma_before"] for t in tests], digits=2),
+                Column("soil after, sigma off", [t["sigma_after"] for t in tests], digits=2),
             ],
             "Distances in standard deviations of what such tests scatter from place to place.",
         )
@@ -142,7 +117,6 @@ def _tables(found: GapReport) -> Iterator[ReportTable]:
 def _suspects(found: GapReport) -> ReportTable:
     """The likeliest explanations, those that are claimed first."""
     shown = found.suspects[:_LISTED]
-    given = ", and if ".join(texts(found.conditions))
     gains = [np.nan if s.predictive_gain is None else s.predictive_gain for s in shown]
     columns = [
         Column("effects", [" + ".join(s.effects) for s in shown]),
@@ -155,7 +129,6 @@ def _suspects(found: GapReport) -> ReportTable:
         f"Probability of a gap {found.gap_probability:.2f}, of a cause outside the catalogue "
         f"{found.outside_probability:.2f}."
     )
-    note += f" Probabilities are valid if {given}." if given else ""
     return ReportTable("Explanations", columns, note)
 
 
@@ -211,10 +184,8 @@ def _discrepancy(found: GapReport) -> ReportTable:
 
 def _next_runs(found: GapReport) -> ReportTable:
     runs = found.next_runs
-    sigma = [min(run.discrimination, _MOST_SIGMA) for run in runs]
+    sigma = [run.discrimination for run in runs]
     columns = [Column("kind", [run.kind for run in runs]), Column("sigma", sigma, digits=3)]
-    if runs[0].cost is not None:
-        columns.append(Column("cost", [run.cost for run in runs], digits=3))
     columns.append(Column("what to do", [run.text for run in runs]))
     first, *others = [" + ".join(names) or "the soil alone" for names in runs[0].compared or [()]]
     apart = f" of {first} from {', '.join(others)}" if others else ""
@@ -223,14 +194,12 @@ def _next_runs(found: GapReport) -> ReportTable:
 
 
 def _components(found: GapReport) -> ReportTable:
-    names, values, units = [], [], []
-    for key, value in found.variance_components.items():
-        scale = key.removeprefix("noise_scale_")
-        name, unit = _COMPONENTS.get(key, (key, "1"))
-        names.append(name if scale == key else f"noise of {channel_name(scale)} over the declared")
-        values.append(value)
-        units.append(unit)
-    columns = [Column("quantity", names), Column("size", values, units, digits=2)]
+    entries = found.variance_components
+    units = ["rad" if name == "friction_angle_std" else "1" for name in entries]
+    columns = [
+        Column("quantity", [name.replace("_", " ") for name in entries]),
+        Column("size", list(entries.values()), units, digits=2),
+    ]
     return ReportTable(
         "Estimated variation", columns, "It is part of the noise throughout this report."
     )
@@ -277,11 +246,8 @@ def _planned_runs(found: GapReport) -> dict[str, list[Any]]:
     for number, option in enumerate(found.next_runs, 1):
         head: dict[str, Any] = {"run": f"next_{number}", "kind": option.kind, "what": option.text}
         head["separates_sigma"] = option.discrimination
-        if option.cost is not None:
-            head["cost"] = option.cost
         lines += [head | row for row in option.rows or [{}]]
     names = ["run", "kind", "what", "separates_sigma"]
-    names += ["cost"] if any("cost" in line for line in lines) else []
     names += ["slip", "load_N"]
     names += [name for line in lines for name in line if name not in names]
     return {name: [line.get(name, "") for line in lines] for name in dict.fromkeys(names)}

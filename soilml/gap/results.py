@@ -42,7 +42,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Suspect:
-    """An explanation with its odds against all others, under the conditions of the report."""
+    """An explanation with its odds against all others."""
 
     effects: tuple[str, ...]
     log_odds: float  # natural logarithm, within the catalogue
@@ -147,45 +147,8 @@ class NextRun:
     discrimination: float  # expected, in sigma, between the remaining explanations
     #: operating points and predictions of each explanation
     rows: tuple[dict[str, float | str], ...] = field(metadata=ELSEWHERE)
-    cost: float | None = None  # where costs are given, in their unit
     #: The explanations that it separates: the first one from each other one
     compared: tuple[tuple[str, ...], ...] = ()
-
-
-@dataclass(frozen=True)
-class NoiseAgreement:
-    """Mean squared residuals of the soil alone, per degree of freedom, in variances of the noise.
-
-    Of the readings that were not excluded as outliers.
-    """
-
-    declared: float  # under the declared noise, as `identify` states it where none was excluded
-    exceeds_noise: bool  # whether noise alone would exceed it with a probability below 0.001
-    granted: float  # under noise, and scatter of the soil from run to run as below
-    friction_angle_std: float  # rad
-    bearing_std: float  # relative
-    with_discrepancy: bool = False  # Whether a declared discrepancy is part of the noise
-
-    @property
-    def grants_scatter(self) -> bool:
-        """Whether the soil may differ from run to run."""
-        return self.friction_angle_std > 0.0 or self.bearing_std > 0.0
-
-
-@dataclass(frozen=True)
-class SoilTestAgreement:
-    """A plate or shear test, and the same quantity by the soil before and after.
-
-    `sigma_before` and `sigma_after` are the distances in standard deviations of the logarithm.
-    """
-
-    label: str
-    unit: str
-    measured: float
-    before: float
-    after: float
-    sigma_before: float
-    sigma_after: float
 
 
 @dataclass(frozen=True, repr=False)
@@ -212,14 +175,12 @@ class GapReport(Result):
         what is shown.
     outside_probability : float
         That there is a gap with a cause which no effect of the catalogue describes.
-    suspects, conditions : tuple of Suspect, tuple of Remark
-        Explanations with their odds, which are valid under `conditions`, the likeliest first.
+    suspects : tuple of Suspect
+        Explanations with their odds, the likeliest first.
     discrepancy : dict of RemainingDiscrepancy
         Smooth discrepancy of each channel before and after, by column.
     remainder_cause : RemainderCause, optional
         Stage of the cause of the remainder, and what it depends on, where the readings tell.
-    best_unclaimed : tuple of str
-        The explanation that is likeliest where no cause is claimed.
     reasons : tuple of Remark
         Why no cause can be named, or why the data cannot be analysed.
     where : tuple of RegionScore
@@ -235,11 +196,11 @@ class GapReport(Result):
     untestable : dict of Remark
         Why these runs cannot test an effect, by its name.
     notes, not_claimed : tuple of Remark
-        What to know of the data and of the fit; conclusions that the report does not support.
+        What to know of the data and of the fit; what these runs cannot tell apart.
     variance_components : dict of float
         Estimated noise scales, run-to-run standard deviations and autocorrelation.
-    misfit : NoiseAgreement, optional
-        Residuals of the soil alone under the declared noise, and with scatter.
+    misfit : float, optional
+        Mean squared residual of the soil alone per degree of freedom under the declared noise.
     """
 
     status: str
@@ -249,10 +210,8 @@ class GapReport(Result):
     cause_set: tuple[tuple[str, ...], ...] = ()
     probabilities: dict[str, float] = field(default_factory=dict)
     suspects: tuple[Suspect, ...] = ()
-    conditions: tuple[Remark, ...] = ()
     discrepancy: dict[str, RemainingDiscrepancy] = field(default_factory=dict)
     remainder_cause: RemainderCause | None = None
-    best_unclaimed: tuple[str, ...] = ()
     lines: tuple[Remark, ...] = ()
     reasons: tuple[Remark, ...] = ()
     where: tuple[RegionScore, ...] = ()
@@ -264,12 +223,19 @@ class GapReport(Result):
     notes: tuple[Remark, ...] = ()
     not_claimed: tuple[Remark, ...] = ()
     variance_components: dict[str, float] = field(default_factory=dict)
-    misfit: NoiseAgreement | None = None
+    misfit: float | None = None
     gap_probability: float = 0.0
     remainder_probability: float = 0.0
     outside_probability: float = 0.0
     seed: int = 0
     curves: FittedReadings | None = field(default=None, metadata=ELSEWHERE)
+
+    @property
+    def first(self) -> tuple[str, ...]:
+        """The effects that are claimed, else those of the first suspect."""
+        if self.effects:
+            return tuple(e.name for e in self.effects)
+        return self.suspects[0].effects if self.suspects else ()
 
     def report(self) -> Report:
         """Verdict, soil and effects, readings beside the model, where it disagrees, and by what."""
@@ -308,28 +274,26 @@ class GapReport(Result):
         }
 
     @property
-    def soil_tests(self) -> list[SoilTestAgreement]:
-        """The tests of the model's soil, beside the soil before and after."""
-        tests, pairs = self.model.soil_tests, []
+    def soil_tests(self) -> list[dict[str, Any]]:
+        """Each test of the model's soil, and how far the soil before and after is from it.
+
+        `sigma_before` and `sigma_after` are in standard deviations of its logarithm.
+        """
+        tests, sigmas = self.model.soil_tests, []
         for soil in (self.soil_before, self.soil_after):
             values = np.asarray([estimate.value for estimate in soil.values()])
-            pairs.append(deviations(tests, self.model.soil, list(soil), values).tolist())
+            sigmas.append(deviations(tests, self.model.soil, list(soil), values).tolist())
+        names = ("label", "unit", "measured", "sigma_before", "sigma_after")
         return [
-            SoilTestAgreement(
-                test.label(),
-                test.unit,
-                test.measured,
-                *(test.measured * float(np.exp(z * test.scatter)) for z in both),
-                *both,
-            )
-            for test, *both in zip(tests, *pairs, strict=True)
+            dict(zip(names, (test.label(), test.unit, test.measured, *both), strict=True))
+            for test, *both in zip(tests, *sigmas, strict=True)
         ]
 
     def as_json(self) -> dict[str, Any]:
         """The content of gap.json."""
         from soilml import __version__
 
-        more = {"soil_tests": as_json_entry(self.soil_tests), "soilml_version": __version__}
+        more = {"soil_tests": self.soil_tests, "soilml_version": __version__}
         return {**as_json_entry(self), **more}
 
 

@@ -11,15 +11,36 @@ from soilml.config.case import Case
 from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.readings import Readings
 from soilml.parameters import Parameter
-from soilml.physics.contact import Stress, with_normal
+from soilml.physics.contact import with_normal
 from soilml.physics.effects.base import Effect, EffectCard
-from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
+from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.load_case import LoadCase
-from soilml.physics.operating_point import Operating
 
 #: Stages of a model.
 GEOMETRY, NORMAL, SHEAR = "contact geometry", "normal stress", "shear stress"
 OPERATING = "slip or load"
+#: Name, stage and method of each change, a small size, and what it does to a value by a size.
+_CHANGES: list[tuple[str, str, str, float, Callable[[Any, LoadCase, Real], Any]]] = [
+    ("change-normal", NORMAL, "on_stress", 0.1,
+     lambda stress, at, size: with_normal(stress, stress.normal * (1.0 + size), at.soil)),
+    ("change-shear", SHEAR, "on_stress", 0.1,
+     lambda stress, _, size: replace(stress, shear=stress.shear * (1.0 + size))),
+    ("change-entry", GEOMETRY, "on_contact", 0.1,
+     lambda rim, _, size: replace(
+         rim, entry=rim.entry * (1.0 + size), peak=rim.peak * (1.0 + size))),
+    ("change-exit", GEOMETRY, "on_contact", 0.2,
+     lambda rim, _, size: replace(rim, exit=rim.exit - size * rim.entry)),
+    ("change-peak", GEOMETRY, "on_contact", 0.1,
+     lambda rim, _, size: replace(rim, peak=rim.peak + size * rim.entry)),
+    ("change-lever", GEOMETRY, "on_contact", 0.05,
+     lambda rim, _, size: replace(
+         rim, shear_radius=rim.shear_radius + size * rim.radius,
+         lever=rim.lever + size * rim.radius)),
+    ("change-slip", OPERATING, "on_operating", 0.02,
+     lambda at, _, size: replace(at, slip=at.slip + size)),
+    ("change-load", OPERATING, "on_operating", 0.05,
+     lambda at, _, size: replace(at, load=at.load * (1.0 + size))),
+]  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,23 +50,12 @@ class StageChange(Effect):
     size: Annotated[Real, Parameter("1", -10.0, 10.0, "relative size of the change")] = 0.0
 
 
-def stage_changes(case: Case, readings: Readings) -> list[tuple[str, Floats]]:
-    """Stage of each change that the gears of a case can have, and what it does to readings (m,).
-
-    Changes without an equilibrium, or without influence, are left out.
-    """
-    gears = [model.gear for model in (case.model, *case.gears.values())]
-    suited = {e.name: (stage, e) for stage, e in _CHANGES if all(map(e.applies_to, gears))}
-    effects = {name: effect for name, (_, effect) in suited.items()}
-    return [(suited[s.name][0], s.column) for s in effect_signatures(case, readings, effects)[0]]
-
-
 def _effect(
     name: str,
-    at_stage: str,
-    apply: Callable[[Any, LoadCase, Real], Any],
+    stage: str,
+    method: str,
     reference: float,
-    gear_types: tuple[type, ...] = (),
+    apply: Callable[[Any, LoadCase, Real], Any],
 ) -> type[Effect]:
     """An effect that applies a function at one stage; its reference size is a small change."""
 
@@ -60,50 +70,22 @@ def _effect(
         signs={},
         isolate="",
     )
-    own = {"name": name, "about": about, at_stage: act, "gear_types": gear_types}
+    gear_types = (RigidWheel,) if stage == GEOMETRY else ()
+    own = {"name": name, "about": about, method: act, "gear_types": gear_types}
     return type("StageChange", (StageChange,), own)
 
 
-def _normal(stress: Stress, load_case: LoadCase, size: Real) -> Stress:
-    return with_normal(stress, stress.normal * (1.0 + size), load_case.soil)
+_EFFECTS = {
+    name: (stage, _effect(name, stage, method, reference, apply))
+    for name, stage, method, reference, apply in _CHANGES
+}
 
 
-def _shear(stress: Stress, load_case: LoadCase, size: Real) -> Stress:
-    return replace(stress, shear=stress.shear * (1.0 + size))
+def stage_changes(case: Case, readings: Readings) -> list[tuple[str, Floats]]:
+    """Stage of each change that the gears of a case can have, and what it does to readings (m,).
 
-
-def _entry(rim: WheelArc, load_case: LoadCase, size: Real) -> WheelArc:
-    return replace(rim, entry=rim.entry * (1.0 + size), peak=rim.peak * (1.0 + size))
-
-
-def _exit(rim: WheelArc, load_case: LoadCase, size: Real) -> WheelArc:
-    return replace(rim, exit=rim.exit - size * rim.entry)
-
-
-def _peak(rim: WheelArc, load_case: LoadCase, size: Real) -> WheelArc:
-    return replace(rim, peak=rim.peak + size * rim.entry)
-
-
-def _lever(rim: WheelArc, load_case: LoadCase, size: Real) -> WheelArc:
-    out = size * rim.radius
-    return replace(rim, shear_radius=rim.shear_radius + out, lever=rim.lever + out)
-
-
-def _slip(at: Operating, load_case: LoadCase, size: Real) -> Operating:
-    return replace(at, slip=at.slip + size)
-
-
-def _load(at: Operating, load_case: LoadCase, size: Real) -> Operating:
-    return replace(at, load=at.load * (1.0 + size))
-
-
-_CHANGES = [
-    (NORMAL, _effect("change-normal", "on_stress", _normal, 0.1)),
-    (SHEAR, _effect("change-shear", "on_stress", _shear, 0.1)),
-    (GEOMETRY, _effect("change-entry", "on_contact", _entry, 0.1, (RigidWheel,))),
-    (GEOMETRY, _effect("change-exit", "on_contact", _exit, 0.2, (RigidWheel,))),
-    (GEOMETRY, _effect("change-peak", "on_contact", _peak, 0.1, (RigidWheel,))),
-    (GEOMETRY, _effect("change-lever", "on_contact", _lever, 0.05, (RigidWheel,))),
-    (OPERATING, _effect("change-slip", "on_operating", _slip, 0.02)),
-    (OPERATING, _effect("change-load", "on_operating", _load, 0.05)),
-]
+    Changes without an equilibrium, or without influence, are left out.
+    """
+    gears = [model.gear for model in (case.model, *case.gears.values())]
+    effects = {name: own for name, (_, own) in _EFFECTS.items() if all(map(own.applies_to, gears))}
+    return [(_EFFECTS[s.name][0], s.column) for s in effect_signatures(case, readings, effects)[0]]

@@ -1,17 +1,9 @@
-"""What each status of a gap analysis means, says, advises, and does not support: one table."""
+"""What each status of a gap analysis means, says and advises: one table."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from soilml.remarks import Remark
-
-_OUTSIDE = Remark(
-    "outside-catalogue",
-    "that no cause outside the catalogue has the same signature as the named effect",
-)
-_LAW = "the law of the effect: slip_power, by_slip and by_load describe these data empirically"
-_LEFT = Remark("remaining-discrepancy", "the cause of the remaining discrepancy")
 _NEXT = "Make the first run under Next runs"
 
 
@@ -20,20 +12,19 @@ class Verdict:
     """What a status says, in words.
 
     headline: Template of the verdict, of the figures that `soilml.gap.sentences` has.
-    unsupported: Conclusions that the status does not support.
     """
 
     meaning: str
     headline: str
     advice: str
     tone: str = "warn"
-    unsupported: tuple[Remark, ...] = ()
 
 
 STATUSES = {
     "no-gap": Verdict(
         "model and measurements agree within the noise",
-        "{agreement}",
+        "Model and measurements agree within the noise{beside}: mean squared residual {residual}, "
+        "probability of a gap {gap}.",
         "Use the model as it is, within the measured range of slip and load.",
         "good",
     ),
@@ -42,7 +33,6 @@ STATUSES = {
         "Missing effect: {names}{sure}{shrinks}.",
         f"model.toml contains the effect. {_NEXT} to confirm it.",
         "plain",
-        (_OUTSIDE,),
     ),
     "partly-named": Verdict(
         "the evidence supports these effects; a smooth remainder is left unexplained",
@@ -50,44 +40,34 @@ STATUSES = {
         "model.toml contains the effect and, under [discrepancy], the size of what is left, which "
         f"widens every interval computed from it. {_NEXT}.",
         "plain",
-        (_OUTSIDE, _LEFT),
     ),
     "class": Verdict(
         "several explanations account for the gap; these runs cannot distinguish them",
         "Missing effect: one of {count} explanations, likeliest {names}{sure}{shrinks}.",
         f"{_NEXT}: it discriminates best between the explanations.",
-        unsupported=(
-            Remark("which-effect", "which of the effects is present; model.toml mixes all"),
-        ),
     ),
     "form-open": Verdict(
         "one effect accounts for the gap, with a law that differs from the catalogue's",
         "Missing effect: {names}, by another law than the catalogue's{sure}{shrinks}.",
         "model.toml contains the effect with a law fitted to these data. Use it within the "
         "measured range of slip and load.",
-        unsupported=(_OUTSIDE, Remark("law", _LAW)),
     ),
     "suspected": Verdict(
         "ranked suspects: no cause can be named",
         "Cause not certain: first suspect is {names}{sure}{shrinks}.",
         f"{_NEXT}. model.toml mixes the explanations that hold 95 % together, each with its "
         "weight.",
-        unsupported=(
-            Remark("cause", "any cause: model.toml predicts by a mixture of the explanations"),
-        ),
     ),
     "unknown": Verdict(
         "there is a gap that no effect explains better than a smooth error",
-        "There is a gap{which} ({size}; probability {gap}).",
+        "There is a gap that no effect explains better than a smooth error ({size}; probability "
+        "{gap}).",
         "See where the model disagrees, then check the sensors and the rig, or define an effect of "
         "your own.",
-        unsupported=(
-            Remark("cause", "any cause: model.toml contains the refitted soil and no new effect"),
-        ),
     ),
     "undecided": Verdict(
         "measurements disagree with each other more than their noise allows",
-        "{disagreement}",
+        "No smooth gap was found, but {why}.",
         "Find out why the measurements disagree: correct the noise in the model file or the runs, "
         "and analyse again.",
     ),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,24 +14,15 @@ from soilml.errors import InputError, solvable
 from soilml.fitting.candidate_effects import candidate_effects, effect_names
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
 from soilml.fitting.fitted_readings import FittedReadings
+from soilml.fitting.least_squares import Solution
+from soilml.fitting.misfit import declared_misfit
 from soilml.fitting.predictions import forces
 from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.usable_readings import prepared_rows
 from soilml.gap.cause_of_remainder import described_cause
-from soilml.gap.checks import ONE_LOAD, estimate_repeat_noise, faults_of, naming_obstacles
-from soilml.gap.conclusions import (
-    like_another_force,
-    like_another_soil,
-    unsupported_conclusions,
-)
-from soilml.gap.decision import decide, ranked_sets, reasons, suspects
-from soilml.gap.disagreements import (
-    disagreements,
-    misfit_remarks,
-    noise_agreement,
-    opened_priors,
-    unpredicted_rows,
-)
+from soilml.gap.checks import estimate_repeat_noise, faults_of, naming_obstacles
+from soilml.gap.decision import Decision, decide, ranked_sets, suspects
+from soilml.gap.disagreements import disagreements, opened_priors
 from soilml.gap.estimates import (
     named_effects,
     returned_case,
@@ -47,14 +38,12 @@ from soilml.gap.held_out import (
     predict_held_out,
     predictive_gains,
     split_holdout,
-    unexplained_figures,
     without_grown,
 )
 from soilml.gap.next_runs import competing_explanations, next_runs
-from soilml.gap.notes import analysis_notes, hidden_effect, outlier_names
+from soilml.gap.notes import analysis_notes, indistinct, one_channel, outlier_names
 from soilml.gap.remainder import discrepancy_map, remaining_discrepancy
-from soilml.gap.results import GapReport
-from soilml.gap.run_options import check_costs, rank_by_cost
+from soilml.gap.results import GapReduction, GapReport
 from soilml.gap.sentences import headline, report_lines
 from soilml.inference import constants
 from soilml.inference.posterior import Posterior, infer
@@ -86,7 +75,6 @@ def gap(
     holdout: str | None = None,
     effects: Mapping[str, type[Effect]] = EFFECTS,
     calibration: Mapping[str, float] | None = None,
-    costs: Mapping[str, float] | None = None,
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> GapReport:
@@ -111,9 +99,6 @@ def gap(
     calibration : mapping, optional
         Standard deviation of the remaining error of a calibrated sensor, by effect name, in the
         unit of the effect's size; by default as the bias of the case declares it.
-    costs : mapping, optional
-        Cost of each kind of next run or check, in any unit, 1 where none is given; they are then
-        ranked by what they discriminate per cost.
     seed : int
         Of all random draws; the same input gives the same report.
     progress : callable, optional
@@ -156,7 +141,6 @@ def gap(
     case = as_case(case)
     effects = candidate_effects(case, effects)
     case = case.without_learned_discrepancy().without_explanations()
-    known_costs = check_costs(costs or {})
     table, remarks = prepared_rows(case, as_table(table), FROM_ORDER)
     known, case = case.remainder, case.without_remainder_of(table)
     remarks += [] if case.remainder is known else [SAME_ROWS]
@@ -185,14 +169,10 @@ def gap(
     if report.model.remainder not in (None, case.remainder):
         learned = report.model.remainder.of_rows(split.analysed)
         report = replace(report, model=replace(report.model, remainder=learned))
-    report = replace(report, next_runs=tuple(rank_by_cost(report.next_runs, known_costs)))
     lines = report_lines(report, effect_names(case))
-    report = replace(report, sentence=headline(report), lines=lines)
-    conclusions = unsupported_conclusions(report, obstacles, fixed_parameters(case, soil))
-    conclusions += like_another_soil(posterior, posterior.soil.fit)
-    first = report.cause_set[0] if report.cause_set else report.best_unclaimed
-    conclusions += like_another_force(posterior, first)
-    return replace(report, not_claimed=tuple(conclusions))
+    unsupported = indistinct(report, posterior, fixed_parameters(case, soil))
+    sentence = headline(report)
+    return replace(report, sentence=sentence, lines=lines, not_claimed=tuple(unsupported))
 
 
 def _bad_data_report(
@@ -237,35 +217,32 @@ def _build_report(
 
     naming: Why the rows cannot identify a cause.
     """
-    gains = predictive_gains(posterior, ranked_sets(posterior)[:SCORED], seed)
+
+    def figures_of(fits: tuple[Solution, Solution]) -> dict[str, GapReduction]:
+        found = gap_reductions(posterior, fits, seed)
+        if held_out is not None and len(held_out):
+            found[split.name] = predict_held_out(posterior, fits, held_out, split.description)
+        return found
+
     quiet = posterior.no_gap > constants.LIKELIER
-    alone, _ = plain_fits(posterior, None)
-    opened = opened_priors(posterior)
-    obstacles = (*opened, *naming)
-    agreement = noise_agreement(case, readings, posterior, alone)
-    kept_back = held_out if held_out is not None and len(held_out) else None
-    conflicts = list[Remark]()
+    fits = plain_fits(posterior, None)
+    alone, kept = fits[0], ~posterior.outliers
+    misfit = declared_misfit(case, readings.subset(kept), posterior.problem.soil, alone.x)
+    gains = {}
     if quiet:
-        conflicts = misfit_remarks(agreement, case, posterior, alone)
-        conflicts += disagreements(posterior)
-        conflicts += unexplained_figures(gap_reductions(posterior, (alone, alone), seed))
-        if kept_back is not None:
-            conflicts += unpredicted_rows(posterior, kept_back, split.description)
-    decision = decide(posterior, gains, obstacles, conflicts)
-    if decision.status == "undecided" and not quiet:
-        conflicts = list(opened)
+        figures = figures_of(fits)
+        found = disagreements(posterior, case, misfit, alone, figures)
+        decision = Decision("undecided" if found else "no-gap", reasons=tuple(found))
+    else:
+        gains = predictive_gains(posterior, ranked_sets(posterior)[:SCORED], seed)
+        decision = decide(posterior, gains, (*opened_priors(posterior), *naming))
+        fits = plain_fits(posterior, decision.shown)
+        figures = figures_of(fits)
     shown = decision.shown
-    fits = plain_fits(posterior, shown)
-    figures = gap_reductions(posterior, fits, seed)
-    if kept_back is not None:
-        figures[split.name] = predict_held_out(posterior, fits, kept_back, split.description)
     added = " + ".join(shown.hypothesis.effects) if shown else ""
     figures, not_reduced = without_grown(figures, added)
-    smooth_gap = decision.status not in ("no-gap", "undecided")
     whole = whole_answer(posterior, decision)
-    written = whole or shown or posterior.soil
-    listed = suspects(posterior, decision, gains) if smooth_gap else []
-    claimed = bool(decision.claimed) and shown is not None
+    claimed = bool(decision.claimed)
     report = GapReport(
         status=decision.status,
         sentence="",
@@ -273,8 +250,7 @@ def _build_report(
         effects=tuple(named_effects(posterior, decision)) if claimed else (),
         cause_set=decision.listed,
         probabilities={n: posterior.probability(n) for n in posterior.effects()},
-        best_unclaimed=listed[0].effects if listed and not decision.claimed else (),
-        reasons=reasons(decision, obstacles, conflicts),
+        reasons=decision.reasons,
         gap=figures,
         soil_before=soil_before(alone),
         soil_after=soil_after(posterior, seed),
@@ -282,41 +258,32 @@ def _build_report(
         notes=(
             *notes,
             *not_reduced,
-            *analysis_notes(posterior, alone, written, split.analysed.place),
-            *(hidden_effect(posterior, alone) if decision.status == "no-gap" else ()),
+            *analysis_notes(
+                posterior, alone, whole or shown or posterior.soil, split.analysed.place
+            ),
+            *(one_channel(posterior) if decision.status == "no-gap" else ()),
         ),
         variance_components=variance_component_entries(posterior),
-        misfit=agreement,
+        misfit=None if misfit is None else misfit.per_freedom,
         gap_probability=1.0 - posterior.no_gap,
         remainder_probability=1.0 - (shown or posterior.soil).share_without,
         outside_probability=posterior.outside,
         seed=seed,
         curves=FittedReadings.of_solutions(*fits, posterior.std),
     )
-    if not smooth_gap:
+    if decision.status in ("no-gap", "undecided"):
         return report
+    listed = suspects(posterior, decision, gains)
     explained = shown if claimed and shown is not None else posterior.soil
     rivals = competing_explanations(posterior, decision, listed)
     return replace(
         report,
         suspects=tuple(listed),
-        conditions=tuple(_conditions(posterior, obstacles)),
         where=tuple(discrepancy_map(posterior, alone)),
         discrepancy=remaining_discrepancy(posterior, posterior.soil, shown or posterior.soil),
         remainder_cause=described_cause(posterior, explained, seed),
         next_runs=tuple(next_runs(posterior, rivals)),
     )
-
-
-def _conditions(posterior: Posterior, obstacles: Sequence[Remark]) -> Iterator[Remark]:
-    """The conditions under which the odds of suspects are valid."""
-    text = "no other cause than those of the catalogue has a similar signature"
-    yield Remark("catalogue-complete", text)
-    if len(posterior.terms.readings.runs) == 1:
-        yield Remark("one-bed", "the bed was the same for all rows")
-    if any(obstacle.code == ONE_LOAD for obstacle in obstacles):
-        text = "the soil parameters lie inside their priors, because one load cannot test them"
-        yield Remark("inside-priors", text)
 
 
 def _check_size(table: Table) -> None:

@@ -13,7 +13,7 @@ from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.effect_signatures import Signature, effect_signatures
 from soilml.inference import constants
 from soilml.inference.evidence import linear_model, of_priors
-from soilml.inference.explanation import Explanation, Prediction
+from soilml.inference.explanation import Explanation, StartedFit
 from soilml.inference.gaussian_terms import Hyperparameters
 from soilml.inference.problem import SOIL_ALONE, Hypothesis
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 def additions(
     search: Search, node: Explanation, ladder: Sequence[Hyperparameters]
-) -> dict[Hypothesis, Prediction]:
+) -> dict[Hypothesis, StartedFit]:
     """Predicted values of a node's hypothesis with one thing more, the best of a ladder."""
     p = len(node.fit.x)
     extra, moves = _moves(search, node)
     model = linear_model(search.terms, node.fit, node.outliers, extra)
     start = node.fit.start_values()
-    found: dict[Hypothesis, Prediction] = {}
+    found: dict[Hypothesis, StartedFit] = {}
     prior = constants.DISCREPANCY_PRIOR
     for at in ladder:
         try:
@@ -45,7 +45,7 @@ def additions(
                 continue
             value += rest + search.problem.penalty(hypothesis)
             if hypothesis not in found or value < found[hypothesis].value:
-                found[hypothesis] = Prediction(value, start, at, node.outliers)
+                found[hypothesis] = StartedFit(hypothesis, start, at, node.outliers, value=value)
     return found | _by_catalogue(search, node, start) | _opened(search, node, start)
 
 
@@ -99,7 +99,7 @@ def _signatures(search: Search, node: Explanation) -> list[Signature]:
 
 def _by_catalogue(
     search: Search, node: Explanation, start: Mapping[str, float]
-) -> dict[Hypothesis, Prediction]:
+) -> dict[Hypothesis, StartedFit]:
     """The hypothesis by the catalogue's laws, where that with free ones is a node.
 
     Whether the catalogue's laws explain too decides how far free ones count for an effect.
@@ -107,12 +107,12 @@ def _by_catalogue(
     if not node.hypothesis.free_law:
         return {}
     own = replace(node.hypothesis, free_law=False)
-    return {own: Prediction(node.value, start, node.at, node.outliers)}
+    return {own: StartedFit(own, start, node.at, node.outliers, value=node.value)}
 
 
 def _opened(
     search: Search, node: Explanation, start: Mapping[str, float]
-) -> dict[Hypothesis, Prediction]:
+) -> dict[Hypothesis, StartedFit]:
     """The hypothesis with the priors of its soil opened, where that can matter.
 
     The fit presses against one of them, or a large discrepancy is left.
@@ -135,4 +135,5 @@ def _opened(
         for c in problem.wide_soil
     }
     wide = replace(h, wide_priors=True)
-    return {wide: Prediction(node.value, {**start, **opened}, node.at, node.outliers)}
+    start = {**start, **opened}
+    return {wide: StartedFit(wide, start, node.at, node.outliers, value=node.value)}

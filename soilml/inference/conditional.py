@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats, Integers
 from soilml.inference.evidence import LinearisedFit
@@ -52,24 +51,12 @@ class Conditional:
 
         The scatter of each combination is that of the run of the reading.
         """
-        own, rest = self._roots(scatter, columns, self.run)
+        own = np.zeros_like(scatter)
+        if len(self.root):
+            own = np.einsum("ijk,ik->ij", self.root[self.run], scatter)
+            columns = columns - np.einsum("ij,ijk->ik", scatter, self.back[self.run])
+        rest = columns @ np.linalg.cholesky(self.covariance)
         return np.asarray((own**2).sum(axis=1) + (rest**2).sum(axis=1))
-
-    def joint(self, own: NDArray[np.bool_]) -> Floats:
-        """Covariance (k, k) of k readings that are left out, with independent noise."""
-        run = self.run[own]
-        scatter, rest = self._roots(self.scatter[own], self.columns[own], run)
-        same = (run[:, None] == run) * (scatter @ scatter.T)
-        return np.asarray(np.diag(self.noise[own] ** 2) + same + rest @ rest.T)
-
-    def _roots(self, scatter: Floats, columns: Floats, run: Integers) -> tuple[Floats, Floats]:
-        """Combinations in independent unit variances: of the scatter of a run, and of the rest."""
-        factor = np.linalg.cholesky(self.covariance)
-        if not len(self.root):
-            return np.zeros_like(scatter), columns @ factor
-        own = np.einsum("ijk,ik->ij", self.root[run], scatter)
-        rest = columns - np.einsum("ij,ijk->ik", scatter, self.back[run])
-        return own, rest @ factor
 
 
 def conditional(model: LinearisedFit, at: Hyperparameters) -> Conditional:

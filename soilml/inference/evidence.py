@@ -129,71 +129,58 @@ class LinearisedFit:
             self._products[autocorrelation] = white.products_with(self.terms, own)
         return self._products[autocorrelation]
 
-    def _ordered(self, autocorrelation: float, used: Integers, order: Integers) -> Products:
-        """Products of the used columns and of [J, r] in an order; see `products`."""
-        key = autocorrelation, used.tobytes() + order.tobytes()
-        if key not in self._taken:
-            found = self.products(autocorrelation)
-            p = self.jacobian.shape[1]
-            q = found.others.shape[1] - p - 1
-            self._taken[key] = found.taken(np.concatenate([used, q + order, [q + p]]))
-        return self._taken[key]
-
-    def eliminated(
-        self, at: Hyperparameters, order: Integers | None = None
-    ) -> tuple[Integers, Products, Eliminated]:
-        """Numbers of the used columns without scatter, products of [U, J, r], and what is left.
-
-        order (p,): Of the coordinates; as they are by default.
-        """
-        terms = self.terms
+    def eliminated(self, at: Hyperparameters) -> tuple[Integers, Products, Eliminated]:
+        """Numbers of the used columns without scatter, products of [U, J, r], and what is left."""
+        terms, p = self.terms, len(self.x)
         used = np.flatnonzero(terms.variance(at)[terms.without_scatter] > 0.0)
-        order = np.arange(self.jacobian.shape[1]) if order is None else order
-        found = self._ordered(at.autocorrelation, used, order)
+        key = at.autocorrelation, used.tobytes()
+        if key not in self._taken:
+            whole = self.products(at.autocorrelation)
+            q = whole.others.shape[1] - p - 1
+            self._taken[key] = whole.taken(np.append(used, np.arange(q, q + p + 1)))
+        found = self._taken[key]
         left = found.eliminated(np.exp(-2.0 * at.log[terms.groups :]), terms.scatter_std(at))
         return terms.without_scatter[used], found, left
 
     def normal_equations(
-        self, at: Hyperparameters, order: Integers | None = None
+        self, at: Hyperparameters
     ) -> tuple[Integers, Products, Eliminated, Floats, Floats, Floats]:
         """What `eliminated` gives; scale (q,), matrix (q, q) and right-hand side (q,) of the rest.
 
         Unknowns are the weights of the used columns in their standard deviations, `scale`, and then
-        the coordinates in an order.
+        the coordinates.
         """
-        used, products, left = self.eliminated(at, order)
+        used, products, left = self.eliminated(at)
         k, p, total = len(used), len(self.x), left.left
-        order = np.arange(p) if order is None else order
         scale = np.concatenate([np.sqrt(self.terms.variance(at)[used]), np.ones(p)])
         matrix = scale[:, None] * total[:-1, :-1] * scale
         matrix[np.arange(k), np.arange(k)] += 1.0
-        matrix[k:, k:] += (np.diag(self.precision) + self.information)[np.ix_(order, order)]
+        matrix[k:, k:] += np.diag(self.precision) + self.information
         b = scale * total[:-1, -1]
-        b[k:] -= self.pull[order]
+        b[k:] -= self.pull
         return used, products, left, scale, matrix, b
 
     def evaluate(self, at: Hyperparameters) -> Evaluation:
         """The model at some hyperparameters.
 
-        In one Cholesky factor, coordinates at a bound stand after the others: the solution of the
-        first ones leaves them where they are, and the determinant has all.
+        Coordinates at a bound stay where they are; the determinant has all.
         """
         from scipy.linalg.lapack import dtrtri
 
-        terms, p, first = self.terms, len(self.x), self.terms.groups
-        order = np.concatenate([np.flatnonzero(~self.held), np.flatnonzero(self.held)])
-        used, products, scatter, scale, matrix, b = self.normal_equations(at, order)
-        total, counts, k = scatter.left, products.counts, len(used)
-        free = k + int(np.count_nonzero(~self.held))
+        terms, first = self.terms, self.terms.groups
+        used, products, scatter, scale, matrix, b = self.normal_equations(at)
+        total, counts, k, p = scatter.left, products.counts, len(used), len(self.x)
         factor = np.linalg.cholesky(matrix)
         root, _ = dtrtri(factor, lower=1)
-        half = root[:free, :free] @ b[:free]
-        beta = np.zeros(len(scale))
-        beta[:free] = half @ root[:free, :free]
+        inverse = root.T @ root
+        beta, held = inverse @ b, np.append(np.zeros(k, bool), self.held)
+        if held.any():
+            beta = np.zeros(k + p)
+            beta[~held] = np.linalg.solve(matrix[np.ix_(~held, ~held)], b[~held])
         prior, gradient, curvature = prior_of_hyperparameters(terms, at)
         value = float(
             total[-1, -1]
-            - half @ half
+            - b @ beta
             + 2.0 * np.log(np.diag(factor)).sum()
             + scatter.log_determinant
             + products.log_determinant
@@ -203,7 +190,6 @@ class LinearisedFit:
             + self.constant.sum()
             + prior
         )
-        inverse = root.T @ root
         of_terms = terms.group[used] >= 0
         change = 2.0 * (1.0 - np.diag(inverse)[:k] - beta[:k] ** 2)
         np.add.at(gradient, terms.group[used][of_terms], change[of_terms])
@@ -237,12 +223,11 @@ class LinearisedFit:
             part, rest = shared[:, j], 1.0 - alone[:, j, j]
             square = rest @ (rest - 2.0 * (part**2).sum(axis=1)) + ((part.T @ part) ** 2).sum()
             curvature[g] += 2.0 * float(square)
-        back = np.argsort(order)
-        step, push = np.zeros(p), np.zeros(p)
-        step[order] = beta[k:]
-        push[order[free - k :]] = b[free:] - factor[free:, :free] @ half
-        covariance = inverse[k:, k:][np.ix_(back, back)]
-        return Evaluation(at, value, gradient, curvature, covariance, step, push, beta[:k], used)
+        push = np.where(self.held, (b - matrix @ beta)[k:], 0.0)
+        covariance = inverse[k:, k:]
+        return Evaluation(
+            at, value, gradient, curvature, covariance, beta[k:], push, beta[:k], used
+        )
 
     def best(self, start: Hyperparameters, iterations: int = ITERATIONS) -> Evaluation:
         """The model at the largest evidence, as far as `start` allows a discrepancy."""
@@ -276,6 +261,16 @@ class LinearisedFit:
         value += float((strays + LOG_2PI).sum())
         value -= 2.0 * float(np.log(constants.AUTOCORRELATIONS[at.autocorrelation]))
         return value + float(np.count_nonzero(~self.outliers)) * LOG_2PI
+
+    def log_density(self, at: Hyperparameters, left_out: Booleans) -> float:
+        r"""ln p of readings given all others: the difference of two evidences.
+
+        .. math:: \ln p(y_o \mid y_r) = \ln p(y) - \ln p(y_r)
+
+        References: Vehtari and Ojanen, Statistics Surveys 6, 2012, section 2 (the log score).
+        """
+        rest = self.without(self.outliers | left_out)
+        return -0.5 * (self.evaluate(at).value - rest.evaluate(at).value)
 
     def reduced(self, at: Hyperparameters) -> tuple[Floats, float]:
         """Products (p + 1, p + 1) of [J, r] under the covariance at `at`; ln of its determinant.

@@ -65,22 +65,16 @@ class Explanation:
         return self.best.at
 
 
-@dataclass(frozen=True)
-class Prediction:
-    """The predicted value of a hypothesis, and where its fit starts."""
-
-    value: float
-    start: Mapping[str, float]
-    at: Hyperparameters
-    outliers: Booleans
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StartedFit:
-    """A fit to be made: hypothesis, coordinates to start from by path, and hyperparameters."""
+    """A fit to be made: hypothesis, coordinates to start from by path, and hyperparameters.
+
+    near: A linearisation near the start. value: What is predicted of the hypothesis.
+    """
 
     hypothesis: Hypothesis
     start: Mapping[str, float]
     at: Hyperparameters
     outliers: Booleans
     near: Linearisation | None = None
+    value: float = np.inf

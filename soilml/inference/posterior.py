@@ -320,17 +320,6 @@ class Posterior:
             )
         return found
 
-    def log_density(self, node: Explanation, left_out: NDArray[np.bool_]) -> float:
-        r"""ln p of readings given all others, by a hypothesis: the difference of two evidences.
-
-        .. math:: \ln p(y_o \mid y_r, h) = \ln p(y \mid h) - \ln p(y_r \mid h)
-
-        References: Vehtari and Ojanen, Statistics Surveys 6, 2012, section 2 (the log score).
-        """
-        with_ = node.linear.evaluate(node.at).value
-        rest = node.linear.without(node.outliers | left_out).evaluate(node.at).value
-        return -0.5 * (with_ - rest)
-
 
 def shape_deviation(node: Explanation) -> float:
     """Squared distance of the shapes from the catalogue's laws, in prior variances."""

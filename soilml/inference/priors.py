@@ -36,7 +36,7 @@ def prior_of_hyperparameters(
     if at.present:
         a, scale = np.exp(at.log[own]), constants.UNKNOWN_SCALE
         share = a / scale
-        usual, tail = _densities_of_amplitude(a)
+        usual, tail = densities_of_amplitude(a)
         slope = (-usual - tail * 2.0 * share / scale / (1.0 + share**2)) / (usual + tail)
         value += float(-2.0 * (np.log(usual + tail) + at.log[own]).sum())
         gradient[own], curvature[own] = -2.0 * (1.0 + a * slope), np.minimum(a, 1.0)
@@ -50,7 +50,7 @@ def prior_of_hyperparameters(
     return value, gradient, curvature
 
 
-def _densities_of_amplitude(a: Floats) -> tuple[Floats, Floats]:
+def densities_of_amplitude(a: Floats) -> tuple[Floats, Floats]:
     """Densities of amplitudes a (c,), in usual ones: of a usual error, and of an unknown cause."""
     q, scale = constants.UNKNOWN_CAUSE, constants.UNKNOWN_SCALE
     return (1.0 - q) * np.exp(-a), q * 2.0 / np.pi / scale / (1.0 + (a / scale) ** 2)
@@ -58,7 +58,7 @@ def _densities_of_amplitude(a: Floats) -> tuple[Floats, Floats]:
 
 def unknown_cause(amplitude: Floats) -> float:
     """Probability that discrepancies of channels (c,), in usual ones, have an unknown cause."""
-    usual, tail = _densities_of_amplitude(amplitude)
+    usual, tail = densities_of_amplitude(amplitude)
     return 1.0 - float(np.prod(usual / (usual + tail)))
 
 

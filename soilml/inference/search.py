@@ -26,7 +26,7 @@ from soilml.inference import constants
 from soilml.inference.additions import additions
 from soilml.inference.conditional import leave_one_out
 from soilml.inference.evidence import linear_model
-from soilml.inference.explanation import Explanation, Prediction, StartedFit
+from soilml.inference.explanation import Explanation, StartedFit
 from soilml.inference.gaussian_terms import (
     DISCREPANCY,
     FIRST_AMPLITUDE,
@@ -63,7 +63,7 @@ class Search:
     problem: InferenceProblem
     progress: Callable[[float], None] = lambda _: None
     nodes: dict[Hypothesis, Explanation] = field(default_factory=dict)
-    predicted: dict[Hypothesis, Prediction] = field(default_factory=dict)
+    predicted: dict[Hypothesis, StartedFit] = field(default_factory=dict)
     untestable: dict[str, Remark] = field(default_factory=dict)
     signatures: dict[tuple[str, ...], list[Signature]] = field(default_factory=dict)
     _tried: set[Hypothesis] = field(default_factory=set)
@@ -158,15 +158,13 @@ class Search:
         half = np.where(np.arange(len(at.log)) >= self.terms.groups, 0.5 * at.log, at.log)
         alone = replace(soil, fit=fit, linear=model)
         found = additions(self, alone, [at, replace(at, log=half)])
-        singles = sorted(
-            ((own.value, h, own) for h, own in found.items() if len(h.effects) == 1),
-            key=lambda item: item[:2],
-        )
+        singles = [own for h, own in found.items() if len(h.effects) == 1]
         jobs: list[StartedFit] = []
-        for _, h, own in singles[: 2 * constants.FITS]:
+        for own in sorted(singles, key=_by_value)[: 2 * constants.FITS]:
             start = {path: 0.5 + INWARD * (x - 0.5) for path, x in own.start.items()}
-            if not any(job.hypothesis.effects == h.effects for job in jobs) or len(jobs) < 3:
-                jobs.append(StartedFit(h, start, own.at, soil.outliers))
+            known = {job.hypothesis.effects for job in jobs}
+            if own.hypothesis.effects not in known or len(jobs) < 3:
+                jobs.append(replace(own, start=start, outliers=soil.outliers))
             if len(jobs) == constants.FITS:
                 break
         self._settle(jobs, float("inf"), constants.NEAR_AT_FIRST)
@@ -330,22 +328,13 @@ class Search:
                 known = self.predicted.get(hypothesis)
                 if known is None or own.value < known.value:
                     self.predicted[hypothesis] = own
-        open_ = [
-            (own.value, h)
-            for h, own in self.predicted.items()
-            if h not in self.nodes and h not in self._tried
-        ]
-        open_.sort()
-        within = [
-            (value, h)
-            for value, h in open_
-            if value < lowest + (constants.NEAR if len(h.effects) <= 1 else constants.NEAR_SET)
-        ][: constants.FITS]
-        if first:
-            singles = [own for own in open_ if len(own[1].effects) == 1]
-            within = sorted({*within, *singles[: constants.FITS // 2]})
-        chosen = [(h, self.predicted[h]) for _, h in within]
-        return [StartedFit(h, own.start, own.at, own.outliers) for h, own in chosen]
+        done = {*self.nodes, *self._tried}
+        left = sorted((p for h, p in self.predicted.items() if h not in done), key=_by_value)
+        single = [p for p in left if len(p.hypothesis.effects) == 1]
+        reach = {True: lowest + constants.NEAR, False: lowest + constants.NEAR_SET}
+        chosen = [p for p in left if p.value < reach[len(p.hypothesis.effects) <= 1]]
+        chosen = chosen[: constants.FITS] + (single[: constants.FITS // 2] if first else [])
+        return sorted(set(chosen), key=_by_value)
 
     def _ladder(self, node: Explanation) -> list[Hyperparameters]:
         """Hyperparameters that an addition may lead to: less discrepancy, or less scatter."""
@@ -358,6 +347,11 @@ class Search:
                 still = np.where(kinds[1], np.minimum(at.log, LITTLE_SCATTER), at.log)
                 found.append(replace(at, log=still))
         return found
+
+
+def _by_value(predicted: StartedFit) -> tuple[float, Hypothesis]:
+    """What predictions are ordered by: their values, then their hypotheses."""
+    return predicted.value, predicted.hypothesis
 
 
 def _careful(

@@ -123,8 +123,6 @@ LINES = {
     f"{GAP} --holdout pass=2": "column pass is missing",
     f"{GAP} --holdout load_N=61": "no row has load_N = 61",
     f"{GAP} --holdout run": "needs four runs or more; the table has 2",
-    f"{GAP} --cost dance=2": "cost of 'dance': no such kind of run",
-    f"{GAP} --cost reverse=0": "needed is a number above zero",
     f"{GAP} --checked bulldozing=1": "needed is EFFECT=STD, with one of",
     f"{GAP} --checked torque-gain=0": "must be a number above zero",
     f"{GAP} --effects broken.py": "division by zero",

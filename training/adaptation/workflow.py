@@ -19,7 +19,6 @@ from soilml.config.explanations import likeliest_with_effects
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.gap import GapReport, gap
-from soilml.gap.disagreements import OUTSIDE_PRIORS
 from soilml.gap.held_out import RUNS_PER_HELD_OUT
 from soilml.gap.report import gap_files
 from soilml.identification.model_error_inputs import with_exact_model
@@ -301,7 +300,7 @@ def _refusal(
     if not (status in CLAIMED or (status == "suspected" and suspected)) or not effects:
         text = f"the gap analysis ends with {status}, which supports no change of the model"
         return Remark(f"gap-{status}", text, severity="note")
-    if any(one.code in ("prior-opened", OUTSIDE_PRIORS) for one in found.reasons):
+    if any(one.code in ("prior-opened", "soil-outside-priors") for one in found.reasons):
         text = (
             "only soils outside of [soil.prior] explain the gap; give priors in which the "
             "soils to come lie, and in which gap/report.html finds that of the campaign"

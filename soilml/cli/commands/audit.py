@@ -9,8 +9,8 @@ from soilml.cli.options import InputFile, OutputFile
 FORMATS = ("table", "json")
 DESCRIPTION = """\
 Determine which missing effects the planned runs of DESIGN.csv could identify
-with the sensors of MODEL.toml, which they could not, and which run to add. No
-measurement is needed.
+with the sensors of MODEL.toml, and which they could not. No measurement is
+needed.
 
   soilml plan effects MODEL.toml DESIGN.csv
   soilml plan effects MODEL.toml DESIGN.csv --out audit.json
@@ -23,15 +23,13 @@ In the table, `left` is the signal of an effect of its reference size in
 standard deviations of the noise (sigma) after the free soil parameters have
 absorbed what they can, and `apart` is the part of it that its most similar
 rival cannot explain: an effect can be named from about 3. `detectable` is the
-smallest size that is noticed in four of five data sets. With --cost, runs to
-add are ranked by the effects that they gain per cost.
+smallest size that is noticed in four of five data sets.
 """
 ARGUMENTS = (
     ("model MODEL.toml", "gear, soil and noise", InputFile),
     ("design DESIGN.csv", "planned rows: CSV, Parquet or .xlsx", InputFile),
     "free",
     ("--out FILE.json", "write the audit to this file", OutputFile),
-    "cost",
     "ignore-extra",
     "effects",
 )
@@ -39,7 +37,7 @@ ARGUMENTS = (
 
 def run(args: argparse.Namespace) -> int:
     """Audit and print or write."""
-    from soilml.cli.option_values import parse_costs, parse_names
+    from soilml.cli.option_values import parse_names
     from soilml.cli.options import available_effects
     from soilml.cli.output import deliver, tell
     from soilml.cli.progress import working
@@ -49,11 +47,10 @@ def run(args: argparse.Namespace) -> int:
     from soilml.gap import audit
 
     design = read_long_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
-    costs = parse_costs(args)
     effects = available_effects(args)
     case = read_case(args.model, effects, with_explanations=True)
     with working(f"auditing {len(design)} rows"):
-        found = audit(case, design, free=parse_names(args.free), effects=effects, costs=costs)
+        found = audit(case, design, free=parse_names(args.free), effects=effects)
     deliver(args, found.report(), found.as_json())
     for line in ignored_discrepancy(case, "the audit", "effects are harder to name than it says"):
         tell(line.text)

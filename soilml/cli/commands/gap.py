@@ -45,7 +45,7 @@ Runs of several wheels on one soil: write each as [gears.NAME] in MODEL.toml,
 and name it in the column gear. An effect of one wheel is then grousers@NAME.
 
 --checked torque-gain=0.003 declares the standard deviation of a sensor's fault
-after calibration. --cost second-pass=3 gives the cost of a kind of run.
+after calibration.
 """
 ARGUMENTS = (
     "model-and-runs",
@@ -54,7 +54,6 @@ ARGUMENTS = (
     "free",
     "seed",
     ("--checked EFFECT=STD", "std of a sensor's fault after calibration; can repeat", REPEATED),
-    "cost",
     "rows",
     "effects",
 )
@@ -67,7 +66,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Analyse and write the four files."""
-    from soilml.cli.option_values import parse_costs, parse_names
+    from soilml.cli.option_values import parse_names
     from soilml.cli.options import available_effects
     from soilml.cli.output import origin_of, show_result, tell
     from soilml.cli.progress import progress_bar
@@ -81,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.gap import gap
     from soilml.gap.report import gap_files
 
-    table, costs = read_rows(args, RUNS), parse_costs(args)
+    table = read_rows(args, RUNS)
     effects = available_effects(args)
     if args.gear is not None:
         case = read_case_of_rows(args, args.model, table, effects, with_explanations=True)
@@ -96,7 +95,6 @@ def run(args: argparse.Namespace) -> int:
             holdout=args.holdout,
             effects=effects,
             calibration=_calibration(args.checked, effects),
-            costs=costs,
             seed=args.seed,
             progress=lambda share: done(round(100 * share)),
         )

@@ -8,10 +8,7 @@ from gap_sets import case_of, driven
 
 from soilml.errors import InputError
 from soilml.gap import audit
-from soilml.gap.identifiability import (
-    identifiability,
-    indistinguishable_classes,
-)
+from soilml.gap.identifiability import identifiability
 from soilml.physics.effects import EFFECTS
 
 #: The soil can change the first reading alone.
@@ -31,7 +28,7 @@ def test_figures_of_a_design_by_hand():
     dug, lugs, ploughed, left = identifiability(SIGNATURES, SOIL, EFFECTS)
     assert (dug.signal, dug.residual_signal) == (pytest.approx(5.0), pytest.approx(3.0))
     assert dug.absorbed == pytest.approx(1.0 - 9.0 / 25.0)
-    assert dug.rivals[0] == ("grousers", pytest.approx(0.8))
+    assert (dug.rival, dug.cosine) == ("grousers", pytest.approx(0.8))
     assert dug.separating_snr == pytest.approx(3.0 * 0.6)
     size = EFFECTS["slip-sinkage"].about.reference["n1"]
     assert (dug.size, dug.unit, dug.kind) == (size, "1", EFFECTS["slip-sinkage"].about.kind)
@@ -40,27 +37,6 @@ def test_figures_of_a_design_by_hand():
     assert ploughed.separating_snr == pytest.approx(12.0)
     assert left.detectable_size == float("inf") and left.signal == pytest.approx(3.0)
     assert identifiability({}, SOIL, EFFECTS) == []
-
-
-@pytest.mark.parametrize("factor, alike", [(1.0, True), (1.2, False)])
-def test_effects_are_alike_where_two_sigma_tell_them_apart(factor, alike):
-    """The weaker of the first two leaves 1.8 sigma, and 2.2 where it is 1.2 times as large."""
-    stronger = SIGNATURES | {"slip-sinkage": factor * SIGNATURES["slip-sinkage"]}
-    found = indistinguishable_classes(stronger, SOIL)
-    assert found == ((("slip-sinkage", "grousers"),) if alike else ())
-    assert indistinguishable_classes({}, SOIL) == ()
-
-
-def test_classes_are_joined_by_a_common_member():
-    chain = {
-        "rate": [0.0, 4.0, 1.0, 0.0, 0.0],
-        "slope": [0.0, 4.0, -1.0, 0.0, 0.0],
-        "multipass": [0.0, 4.0, 0.0, 0.0, 0.0],
-        "bulldozing": [0.0, 0.0, 0.0, 1.5, 0.0],  # below two sigma: in no class
-        "exit-angle": [0.0, 0.0, 0.0, 1.4, 0.0],
-    }
-    chain = {name: np.asarray(column) for name, column in chain.items()}
-    assert indistinguishable_classes(chain, SOIL) == (("rate", "slope", "multipass"),)
 
 
 def test_an_audit_needs_noise():

@@ -1,18 +1,15 @@
-"""Rows held out before an analysis, soil that is free, and a smooth gear."""
+"""Rows held out before an analysis, and soil that is free."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_sets import case_of, driven
+from gap_sets import case_of
 
 from soilml.errors import InputError
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
-from soilml.fitting.readings import stack_readings
 from soilml.gap.held_out import split_holdout
-from soilml.gap.run_options import run_options
 from soilml.io.table import Table
-from soilml.physics.effects import EFFECTS
 from soilml.quantities import SHEAR
 
 
@@ -66,15 +63,3 @@ def test_a_soil_parameter_is_free_or_fixed():
         assert [f.path for f in free] == list(expected)
     with pytest.raises(InputError, match=r"^--free gear.radius is not a soil parameter"):
         free_soil_parameters(case, ["cohesion", "gear.radius"])
-
-
-def test_a_smooth_gear_has_no_lugs_and_all_else():
-    case = case_of()
-    readings = stack_readings(case, driven(case))
-    lugged = replace(case, model=case.model + EFFECTS["grousers"]() + EFFECTS["slip-sinkage"]())
-    (smooth,) = (o for o in run_options(readings, lugged, ["grousers"]) if o.smooth)
-    assert smooth.kind == "smooth gear" and smooth.text.startswith("the same slips with lugs")
-    assert [e.name for e in smooth.changed(lugged).model.effects] == ["slip-sinkage"]
-    assert not any(o.smooth for o in run_options(readings, lugged, ["slip-sinkage"]))
-    several = replace(lugged, gears={"a": lugged.model, "b": lugged.model})
-    assert not any(o.smooth for o in run_options(readings, several, ["grousers"]))

@@ -7,7 +7,10 @@ import pytest
 from gap_sets import case_of, driven
 
 from soilml.fitting.readings import stack_readings
-from soilml.gap.run_options import run_options
+from soilml.gap.run_options import CHECKS, run_options
+from soilml.parameters import declared
+from soilml.physics.effects import EFFECTS
+from soilml.physics.soils import Soil
 
 CASE = case_of()
 
@@ -17,7 +20,7 @@ def options(case=CASE, loads=(40.0, 60.0, 90.0), changed=None, **covariates):
     readings = stack_readings(CASE, driven(CASE, loads=loads, **covariates))
     if changed:
         readings = replace(readings, at=replace(readings.at, **changed))
-    found = list(run_options(readings, case, ()))
+    found = list(run_options(readings, case))
     assert len({o.kind for o in found}) == len(found)
     return {o.kind: o for o in found}
 
@@ -81,7 +84,7 @@ def test_covariates_of_the_driven_rows_are_kept():
 def test_with_several_gears_each_run_is_proposed_for_each():
     readings = stack_readings(CASE, driven(CASE))
     several = replace(CASE, gears={"lugged": CASE.model, "smooth": CASE.model})
-    found = {(o.kind, str(o.at.gear[0])): o for o in run_options(readings, several, ())}
+    found = {(o.kind, str(o.at.gear[0])): o for o in run_options(readings, several)}
     kinds = {kind for kind, _ in found}
     assert len(found) == 2 * len(kinds) == 18
     for (kind, gear), option in found.items():
@@ -90,3 +93,9 @@ def test_with_several_gears_each_run_is_proposed_for_each():
             assert set(option.plain.gear.tolist()) == {gear}
         else:
             assert option.plain is None
+
+
+def test_checks_measure_sizes_of_effects_and_the_soil():
+    sizes = {f"{name}.{effect.about.size}" for name, effect in EFFECTS.items()}
+    measured = [path for _, stds in CHECKS.values() for path in stds]
+    assert set(measured) <= sizes | set(declared(Soil))

@@ -17,7 +17,7 @@ from soilml.fitting.operating_points import operating_points
 from soilml.fitting.predictions import forces, linearise, predict
 from soilml.fitting.readings import stack_readings
 from soilml.gap import gap
-from soilml.gap.planned_readings import planned_readings
+from soilml.gap.identifiability import planned_readings
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import CHANNELS, column

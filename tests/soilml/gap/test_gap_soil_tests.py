@@ -86,7 +86,7 @@ def test_report_compares_the_soil_with_its_tests(reports):
 def test_runs_that_agree_with_the_tests_have_no_gap():
     report = gap(replace(CASE, soil_tests=sand_tests()), runs())
     assert report.status == "no-gap"
-    assert all(abs(t.sigma_after) < 2.0 for t in report.soil_tests)
+    assert all(abs(t["sigma_after"]) < 2.0 for t in report.soil_tests)
 
 
 def test_runs_on_another_soil_than_that_of_the_tests_are_remarked_on():

@@ -154,7 +154,7 @@ def test_the_package_and_its_function_are_called_alike(before):
     code += "import soilml, soilml.gap as module\n"
     code += "assert soilml.gap is module and module.gap is function\n"
     code += "for called in (gap, soilml.gap, function):\n"
-    code += "    try:\n        called(None, {}, effects={}, costs={'flight': 1.0})\n"
+    code += "    try:\n        called(None, {}, effects={})\n"
     code += "    except (soilml.SoilmlError, AttributeError) as error:\n        print(error)\n"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

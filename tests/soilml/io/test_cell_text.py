@@ -65,7 +65,6 @@ def test_options(text, tmp_path, capsys):
         ["simulate", model, "--slip", f"0.{text}", "--load", "60"],
         ["simulate", model, "--slip", f"0.1:0.2:{text}", "--load", "60"],
         ["simulate", model, "--slip", "0.1", "--load", "60", "--speed", text],
-        ["gap", model, runs, "--out", str(tmp_path / "o"), "--cost", f"reverse={text}"],
         ["gap", model, runs, "--out", str(tmp_path / "o"), "--checked", f"torque-offset={text}"],
         ["gap", model, runs, "--out", str(tmp_path / "o"), "--seed", text],
         ["plan", "next", model, "--count", text],

@@ -1,6 +1,5 @@
 """Every result draws itself, into axes of the caller or into a figure of its own."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 from conftest import MODEL
 
 from soilml import Estimator, Table, identify, read_case
-from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
 from soilml.gap.results import GapReduction, GapReport
 from soilml.traction import pull_report
@@ -61,17 +59,6 @@ def imported(case):
     return ImportedLog(table, {}, (), (), radius=0.15)
 
 
-def audited(case):
-    from soilml.gap import audit
-    from soilml.physics.effects import EFFECTS
-
-    slip, load = np.tile([0.1, 0.3, 0.5], 3), np.repeat([40.0, 60.0, 90.0], 3)
-    noisy = replace(case, noise={"torque_Nm": Noise(share=0.02)})
-    names = ("slip-sinkage", "torque-gain")
-    design = {"run": np.repeat(["a", "b", "c"], 3), "slip": slip, "load_N": load}
-    return audit(noisy, design, effects={name: EFFECTS[name] for name in names})
-
-
 def of_plates_and_shear(case):
     from soilml.identification.bevameter import bevameter
 
@@ -96,7 +83,6 @@ def of_plates_and_shear(case):
         (pull, (3,), "drawbar pull, N"),
         (rover, (2, 2), "margin, N"),
         (imported, (1,), "torque / (load × radius)"),
-        (audited, (1,), "that separates it from its nearest rival"),
         (of_plates_and_shear, (3,), "shear strength, kPa"),
     ],
 )
