@@ -25,9 +25,9 @@ from soilml.physics.operating_point import COVARIATES
 #: Correlation lengths of a change: in slip, in the logarithms of load and of sinkage, and of other
 #: quantities as a share of their range. Those of slip and load are those of a discrepancy.
 SLIP_LENGTH, LOG_LENGTH, SHARE_OF_RANGE = 0.3, 0.6, 0.5
-#: Amplitudes of a change that are tried, in usual ones: steps of a factor of about 2.5, which
-#: change the evidence by about 1 near its maximum.
-AMPLITUDES = np.asarray([0.15, 0.4, 1.0, 2.5, 6.3, 16.0])
+#: Amplitudes of a change that are tried, in usual ones: steps of a factor of about 1.6, which
+#: change -2 ln of the evidence by less than 1 near its maximum; steps of 2.5 change it by 2.
+AMPLITUDES = np.asarray([0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0, 25.0])
 #: Factor on differences of the evidence: amplitudes at their maximum overstate it.
 TEMPERING = 0.5
 #: Amplitude of a discrepancy, relative to that beside the fit, that a change may leave.
