@@ -278,8 +278,9 @@ def stack_readings(case: Case, table: Table, *, refuse_zeros: bool = False) -> R
 
     Noise is that of `<column>_std`, else of [noise] in the case. A standard deviation of zero,
     which a relative noise has at a reading of zero, is replaced by the median of the others, with a
-    note. Where all of a channel are zero it counts as undeclared, or raises `FitError` with
-    `refuse_zeros`. The table has the columns of `with_rover_columns`.
+    note. Where all of a channel are zero they stay, and one that is not positive counts as
+    undeclared; with `refuse_zeros` they raise `FitError`. The table has the columns of
+    `with_rover_columns`.
     """
     names = tuple(n for n in CHANNELS if column(n) in table and np.isfinite(table[column(n)]).any())
     own_runs = table["run"] if "run" in table else np.zeros(len(table), dtype=np.int64)
@@ -333,7 +334,7 @@ def _without_zeros(
     if others.size == 0 and refuse:
         raise FitError(f"{found}, and no row has a larger one; declare one such as '2 % + 0.05'")
     if others.size == 0:
-        return np.where(zero, np.nan, std), []
+        return np.where(std > 0.0, std, np.nan), []
     median, more = float(np.median(others)), int(zero.sum()) - 1
     text = f"{found} replaced by the column's median {median:.3g}"
     text += f"; {more} more rows likewise" if more else ""
