@@ -30,8 +30,8 @@ class Tolerance:
     """Where a descent has converged, in decreases of its objective.
 
     The linearised model promises less than `enough`, or less than the fraction `share` of the
-    excess over the number of readings (while the model is far from the data); or `iterations`, which
-    creep, have together given less than `creeping` or `share`.
+    excess over the number of readings (while the model is far from the data); or `iterations`,
+    which creep, have together given less than `creeping` or `share`.
     """
 
     enough: float

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from soilml.fitting.least_squares import Solution
+from soilml.gap.disagreements import soil_outside_priors
 from soilml.gap.results import Suspect
 from soilml.inference import constants
 from soilml.inference.explanation import Explanation
@@ -83,7 +84,7 @@ def decide(
     ranked = ranked_sets(posterior)
     chance = posterior.probability(*ranked[0]) if ranked else 0.0
     if _is_other_soil(posterior) and none > max(constants.UNCERTAIN, chance):
-        return Decision("undecided", reasons=reasons)
+        return Decision("undecided", reasons=(soil_outside_priors(posterior),))
     hopeless = 1.0 - constants.UNCERTAIN if obstacles else 0.0
     if not ranked or (none > constants.UNCERTAIN and none > max(chance, hopeless)):
         return Decision("not-testable" if obstacles else "unknown", reasons=reasons)

@@ -115,13 +115,24 @@ def pressed_priors(fit: Solution) -> dict[str, str]:
 
 def opened_priors(posterior: Posterior) -> tuple[Remark, ...]:
     """That the likeliest explanation lies outside the priors of the soil, which forbids a name."""
-    best = posterior.best
-    if not best.hypothesis.wide_priors:
+    best = posterior.best.hypothesis
+    if not best.wide_priors:
         return ()
+    if not best.effects:
+        return (soil_outside_priors(posterior),)
+    pressed, why = _within_priors(posterior)
+    return (Remark("prior-opened", f"the priors of the soil were opened: {why}", pressed),)
+
+
+def soil_outside_priors(posterior: Posterior) -> Remark:
+    """That the soil alone explains the rows where its priors are opened."""
+    pressed, why = _within_priors(posterior)
+    text = f"a soil outside its priors explains the rows: {why}"
+    return Remark("soil-outside-priors", text, pressed)
+
+
+def _within_priors(posterior: Posterior) -> tuple[tuple[str, ...], str]:
+    """The soil parameters at ends of their priors, and what a fit within these is like."""
     pressed = pressed_priors(posterior.soil.fit)
     why = f"within them, the fit has {'; '.join(pressed.values()) or 'a large remainder'}"
-    if best.hypothesis.effects:
-        text = f"the priors of the soil were opened: {why}"
-        return (Remark("prior-opened", text, tuple(pressed)),)
-    text = f"a soil outside its priors explains the rows: {why}"
-    return (Remark("soil-outside-priors", text, tuple(pressed)),)
+    return tuple(pressed), why
