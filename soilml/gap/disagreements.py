@@ -9,14 +9,15 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.misfit import Misfit, excess_residuals_remark, misfit_limit
+from soilml.gap.decision import pressed_priors
 from soilml.gap.held_out import FITTED
 from soilml.gap.results import GapReduction
 from soilml.identification.fit import disagreeing_soil_tests
-from soilml.inference.constants import PRESSED, SCATTER_UNITS
+from soilml.inference.constants import SCATTER_UNITS
 from soilml.inference.posterior import Posterior
 from soilml.quantities import column
 from soilml.remarks import Remark
-from soilml.report.numbers import decimal, format_quantity
+from soilml.report.numbers import decimal
 
 #: Estimated over declared noise from which the noise counts as scaled up. Its standard error is
 #: about 10 % with the usual fifty degrees of freedom of a channel.
@@ -100,39 +101,3 @@ def _excess_residuals(
         return [Remark("soil-at-prior", text, tuple(pressed))]
     consequence = "no scatter from run to run accounts for them"
     return [excess_residuals_remark(misfit.factor, case, consequence)]
-
-
-def pressed_priors(fit: Solution) -> dict[str, str]:
-    """The soil parameters that a fit has at an end of their prior, by path, in words."""
-    found = {}
-    for c, x in zip(fit.coordinates, fit.x, strict=True):
-        if not c.effect and min(x - c.lower, c.upper - x) < PRESSED:
-            end, bound = ("lower", c.prior.lower) if x < 0.5 else ("upper", c.prior.upper)
-            value = format_quantity(bound, c.unit)
-            found[c.path] = f"{c.name.replace('_', ' ')} at {value}, the {end} end of its prior"
-    return found
-
-
-def opened_priors(posterior: Posterior) -> tuple[Remark, ...]:
-    """That the likeliest explanation lies outside the priors of the soil, which forbids a name."""
-    best = posterior.best.hypothesis
-    if not best.wide_priors:
-        return ()
-    if not best.effects:
-        return (soil_outside_priors(posterior),)
-    pressed, why = _within_priors(posterior)
-    return (Remark("prior-opened", f"the priors of the soil were opened: {why}", pressed),)
-
-
-def soil_outside_priors(posterior: Posterior) -> Remark:
-    """That the soil alone explains the rows where its priors are opened."""
-    pressed, why = _within_priors(posterior)
-    text = f"a soil outside its priors explains the rows: {why}"
-    return Remark("soil-outside-priors", text, pressed)
-
-
-def _within_priors(posterior: Posterior) -> tuple[tuple[str, ...], str]:
-    """The soil parameters at ends of their priors, and what a fit within these is like."""
-    pressed = pressed_priors(posterior.soil.fit)
-    why = f"within them, the fit has {'; '.join(pressed.values()) or 'a large remainder'}"
-    return tuple(pressed), why
