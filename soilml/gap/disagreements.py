@@ -13,17 +13,12 @@ from soilml.gap.decision import pressed_priors
 from soilml.gap.held_out import FITTED
 from soilml.gap.results import GapReduction
 from soilml.identification.fit import disagreeing_soil_tests
-from soilml.inference.constants import SCATTER_UNITS
+from soilml.inference import constants
 from soilml.inference.posterior import Posterior
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import decimal
 
-#: Estimated over declared noise from which the noise counts as scaled up. Its standard error is
-#: about 10 % with the usual fifty degrees of freedom of a channel.
-NOISE_SCALED_UP = 1.3
-#: Run-to-run standard deviation, in usual ones, above which runs disagree with each other.
-UNUSUAL_RUN_EFFECT = 3.0
 #: Mean squared residual of rows kept back that scatter of a few runs seldom leaves: of two runs,
 #: once in fifty times.
 UNEXPLAINED = 4.0
@@ -46,14 +41,14 @@ def disagreements(
     found = _excess_residuals(posterior, case, misfit, alone)
     at = soil.without.at
     for name, scale in zip(terms.readings.channels, terms.noise_scale(at), strict=True):
-        if scale >= NOISE_SCALED_UP:
+        if scale >= constants.NOISE_SCALED_UP:
             size = f"those of {column(name)} {decimal(scale, 2)} times as much"
             text = f"readings scatter more than their declared noise: {size}"
             found.append(Remark("noise-scaled", text, (column(name),)))
     angle, bearing = terms.scatter(at)
-    if max(angle, bearing) >= UNUSUAL_RUN_EFFECT:
-        degrees = np.degrees(angle * SCATTER_UNITS["friction_angle"])
-        share = bearing * SCATTER_UNITS["bearing"]
+    if max(angle, bearing) >= constants.UNUSUAL_RUN_EFFECT:
+        degrees = np.degrees(angle * constants.SCATTER_UNITS["friction_angle"])
+        share = bearing * constants.SCATTER_UNITS["bearing"]
         text = (
             "runs differ from each other like different soils: their friction angle varies by "
             f"{degrees:.2g} deg, and their bearing strength by {share:.0%}"

@@ -49,8 +49,8 @@ def test_the_soil_of_a_part_is_that_of_all_within_its_std(case, monkeypatch):
     whole = identify(case, table, method="nonlinear")
     monkeypatch.setattr(readings, "MOST_FITTED_ROWS", FITTED)
     part = identify(case, table, method="nonlinear")
-    assert part.rows_used == FITTED
+    assert FITTED - 4 < part.rows_used <= FITTED
     thinned = ["rows-thinned" in {r.code for r in fit.warnings} for fit in (part, whole)]
     assert thinned == [True, False]
     assert np.abs((part.values - whole.values) / part.std).max() < 2.5
-    assert part.std == pytest.approx(whole.std * np.sqrt(ROWS / FITTED), rel=0.15)
+    assert part.std == pytest.approx(whole.std * np.sqrt(ROWS / part.rows_used), rel=0.15)
