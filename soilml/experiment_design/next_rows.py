@@ -69,10 +69,11 @@ def advise(
     else:
         readings = usable_readings(case, as_table(rows))
         case, notes = _with_noise_of_rows(case, readings)
-        notes += readings.notes
+        fitted = readings.thinned()
+        notes += fitted.notes
         found = rate_rows(
             case,
-            samples_of_rows(case, readings, selected, exact_model=exact_model),
+            samples_of_rows(case, fitted, selected, exact_model=exact_model),
             candidate_grid(slips, loads, readings.row_load),
             measured=readings.at,
             count=count,

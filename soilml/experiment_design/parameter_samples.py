@@ -67,7 +67,7 @@ def samples_of_rows(
     With `exact_model`, those of the exact posterior. Raises `FitError` as `identify` does, and
     where noise is not declared.
     """
-    found = soil_samples(case, readings.thinned(), free, exact_model)
+    found = soil_samples(case, readings, free, exact_model)
     index, multiplicity = np.unique(found.equally_weighted(count), return_counts=True)
     weights = multiplicity / multiplicity.sum()
     return ParameterSamples(tuple(free), found.sample.u[index], weights, found.noise_scale)

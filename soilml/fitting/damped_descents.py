@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import compress
 
 import numpy as np
 
@@ -13,21 +12,17 @@ from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import Linearisation
-from soilml.numerics.prior import Prior
 
 #: Iterations after which a descent is abandoned as not converged; typical fits need five to ten.
 MAX_ITERATIONS = 50
 #: Levenberg-Marquardt damping: the first value, its factors after a step that achieves more than
-#: `KEPT_PROMISE` of what the linearised model promises, less, and nothing, and its bounds.
+#: `KEPT_PROMISE` of what the linearised model promises of it, less, and nothing, and its bounds.
 FIRST_DAMPING, KEPT_PROMISE = 1e-3, 0.5
-AFTER_KEPT, AFTER_LESS, AFTER_NOTHING = 0.1, 10.0, 1e2
+AFTER_KEPT, AFTER_LESS, AFTER_NOTHING = 0.2, 2.0, 5.0
 MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
 #: Damping, and curvature of a coordinate that changes nothing, with which a step is defined.
 LEAST_DAMPING, LEAST_SCALE = 1e-9, 1e-9
-#: A parameter whose positive bounds differ by this ratio moves by ratios: valleys of the objective
-#: along it and an exponent are straight in its logarithm, which a step may raise by so much.
-RATIO_OF_BOUNDS, MOST_LOG_STEP = 3.0, 2.0
-NEGLIGIBLE_STEP = 1e-3  # Change of all coordinates in which a step that brings nothing is the last
+NEGLIGIBLE_STEP = 1e-6  # Change of all coordinates in which a step that brings nothing is the last
 
 
 @dataclass(frozen=True)
@@ -35,25 +30,23 @@ class Tolerance:
     """Where a descent has converged, in decreases of its objective.
 
     The linearised model promises less than `enough`, or less than the fraction `share` of the
-    excess over the number of readings (while the model is far from the data); the best of several
-    steps gives less than `enough` or `step_share`; or `iterations`, which creep, have together
-    given less than `creeping` or `share`.
+    excess over the number of readings (while the model is far from the data); or `iterations`,
+    which creep, have together given less than `creeping` or `share`.
     """
 
     enough: float
     share: float
-    step_share: float
     iterations: int
     creeping: float
 
 
 #: For estimates: far below the thresholds on differences of the objective, which start at 9.
-FINE = Tolerance(enough=0.01, share=5e-4, step_share=2e-3, iterations=4, creeping=0.15)
+FINE = Tolerance(enough=0.01, share=5e-4, iterations=4, creeping=0.15)
 #: For the least squares of `identify`, and for its descents that only tell optima apart.
-EXACT = Tolerance(enough=1e-9, share=0.0, step_share=0.0, iterations=50, creeping=0.0)
-APART = Tolerance(enough=1e-4, share=1e-5, step_share=1e-5, iterations=50, creeping=0.0)
+EXACT = Tolerance(enough=1e-9, share=0.0, iterations=50, creeping=0.0)
+APART = Tolerance(enough=1e-4, share=1e-5, iterations=50, creeping=0.0)
 #: For fits that are compared first, of which those near the best go on to the fine one.
-COARSE = Tolerance(enough=0.5, share=0.01, step_share=0.01, iterations=3, creeping=1.0)
+COARSE = Tolerance(enough=0.5, share=0.01, iterations=3, creeping=1.0)
 
 
 def descend_each(
@@ -83,7 +76,9 @@ def descend(
 
     with the whitened residuals r and derivatives J of the readings, and the deviations z from
     priors and soil tests and their derivatives T. The model is solved at the end of each step,
-    searched from the sinkage that the last point predicts.
+    searched from the sinkage that the last point predicts. Where a step gives less than half of
+    what it promises, it is corrected for the curvature of the model: valleys of the objective along
+    a modulus and an exponent are narrow and bent.
 
     near: A linearisation that saves the search for equilibrium, where it is at the start.
 
@@ -100,14 +95,16 @@ def descend(
         excess = last.objective - len(last.residual)
         share = tolerance.share * excess
         given = passed[0] - last.objective if len(passed) == passed.maxlen else np.inf
-        promised, x = _step(last, damping)
+        promised, expected, x = _step(last, damping)
         converged = promised < max(tolerance.enough, share) or given < max(
             tolerance.creeping, share
         )
         if converged:
             break
-        passed.append(last.objective)
         new = problem.linearised(x, last.linearisation)
+        if last.objective - new.objective < KEPT_PROMISE * expected:
+            bent = problem.linearised(_corrected(last, new, damping), last.linearisation)
+            new = min(new, bent, key=lambda one: one.objective)
         improvement = last.objective - new.objective
         if improvement <= 0.0:
             converged = float(np.abs(x - last.x).max()) < NEGLIGIBLE_STEP
@@ -115,44 +112,52 @@ def descend(
             if converged or damping > MAX_DAMPING:
                 break
             continue
-        last, kept = new, improvement > KEPT_PROMISE * promised
+        passed.append(last.objective)
+        last, kept = new, improvement > KEPT_PROMISE * expected
         damping = max(damping * (AFTER_KEPT if kept else AFTER_LESS), MIN_DAMPING)
-        little = improvement < max(tolerance.enough, tolerance.step_share * excess)
-        converged = little and not kept
-        if converged:
-            break
     return replace(last, converged=converged)
 
 
-def _step(at: Solution, damping: float) -> tuple[float, Floats]:
-    """What an undamped step promises, and where a damped one leads, (p,).
+def _step(at: Solution, damping: float) -> tuple[float, float, Floats]:
+    """What an undamped step promises and what a damped one does, and where that leads, (p,).
 
-    The promise is the decrease of the linearised objective, up to the bounds. Where a coordinate
-    moves by ratios, its step is one of the logarithm of the parameter.
+    A promise is the decrease of the linearised objective, up to the bounds.
     """
     problem, x = at.problem, at.x
     deviation, rates = problem.terms.deviation(x), problem.terms.rates(x)
-    normal = at.jacobian.T @ at.jacobian + rates.T @ rates
     descent = at.residual @ at.jacobian - deviation @ rates
-    scale = np.diag(np.diag(normal) + LEAST_SCALE)
-    low, high = problem.lower - x, problem.upper - x
-    priors = [c.prior for c in problem.coordinates]
-    ratio = np.asarray([_moves_by_ratios(prior) for prior in priors])
-    size = x[ratio] + [p.lower / (p.upper - p.lower) for p in compress(priors, ratio)]
-    low[ratio] = size * np.log1p(low[ratio] / size)
-    high[ratio] = size * np.minimum(np.log1p(high[ratio] / size), MOST_LOG_STEP)
+    normal, scale = _curvature(at)
+    ends = problem.lower - x, problem.upper - x
     full, step = (
-        bounded_step(normal + factor * scale, descent, low, high)
-        for factor in (LEAST_DAMPING, damping)
+        bounded_step(normal + factor * scale, descent, *ends) for factor in (LEAST_DAMPING, damping)
     )
-    promised = float(2.0 * descent @ full - full @ normal @ full)
-    step[ratio] = size * np.expm1(step[ratio] / size)
-    return promised, np.clip(x + step, problem.lower, problem.upper)
+    promised, expected = (float(2.0 * descent @ s - s @ normal @ s) for s in (full, step))
+    return promised, expected, np.clip(x + step, problem.lower, problem.upper)
 
 
-def _moves_by_ratios(prior: Prior) -> bool:
-    wide = prior.lower > 0.0 and prior.upper > RATIO_OF_BOUNDS * prior.lower
-    return wide and not prior.log and prior.normal_std is None
+def _corrected(last: Solution, new: Solution, damping: float) -> Floats:
+    r"""Where a step led, corrected by what of the model is not linear, (p,).
+
+    .. math:: (N + \lambda\, \mathrm{diag}(N))\, \Delta x = J^T (r - r_0 + J\, \delta x)
+
+    with the residuals r there, and r_0 and J at the last point. That leads back to the floor of a
+    curved valley, and no further along it.
+
+    References: Transtrum and Sethna, arXiv:1201.5885, 2012 (geodesic acceleration).
+    """
+    problem, x = last.problem, new.x
+    bent = new.residual - last.residual + last.jacobian @ (x - last.x)
+    normal, scale = _curvature(last)
+    ends = problem.lower - x, problem.upper - x
+    step = bounded_step(normal + damping * scale, bent @ last.jacobian, *ends)
+    return np.clip(x + step, problem.lower, problem.upper)
+
+
+def _curvature(at: Solution) -> tuple[Floats, Floats]:
+    """Half the curvature (p, p) of the linearised objective, and what damping adds to it."""
+    rates = at.problem.terms.rates(at.x)
+    normal = at.jacobian.T @ at.jacobian + rates.T @ rates
+    return normal, np.diag(np.diag(normal) + LEAST_SCALE)
 
 
 def bounded_step(normal: Floats, descent: Floats, low: Floats, high: Floats) -> Floats:

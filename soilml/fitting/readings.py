@@ -171,15 +171,15 @@ class Readings:
         )
 
     def thinned(self) -> Readings:
-        """At most `MOST_FITTED_ROWS` rows, one from each of as many stretches of the table."""
+        """At most `MOST_FITTED_ROWS` rows: as many of each gear, run and load, or all of few."""
         if self.row_count <= MOST_FITTED_ROWS:
             return self
-        width = self.row_count / MOST_FITTED_ROWS
-        place = np.random.default_rng(0).random(MOST_FITTED_ROWS)
-        rows = ((np.arange(MOST_FITTED_ROWS) + place) * width).astype(np.int64)
+        load = load_levels(self.row_load, self.run, typical_std(self.load_std)).index
+        kinds = np.stack([gear_numbers(self.at), self.run, load])
+        rows = even_part(np.unique(kinds, axis=1, return_inverse=True)[1].ravel(), MOST_FITTED_ROWS)
         text = (
-            f"{MOST_FITTED_ROWS} of {self.row_count} rows are fitted, spread evenly over the table:"
-            " more would tell little beside the errors that all rows share"
+            f"{len(rows)} of {self.row_count} rows are fitted, spread evenly over runs and loads: "
+            "more would tell little beside the errors that all rows share"
         )
         notes = (*self.notes, Remark("rows-thinned", text, severity="note"))
         return replace(self.of_rows(rows)[1], notes=notes)
@@ -278,8 +278,9 @@ def stack_readings(case: Case, table: Table, *, refuse_zeros: bool = False) -> R
 
     Noise is that of `<column>_std`, else of [noise] in the case. A standard deviation of zero,
     which a relative noise has at a reading of zero, is replaced by the median of the others, with a
-    note. Where all of a channel are zero it counts as undeclared, or raises `FitError` with
-    `refuse_zeros`. The table has the columns of `with_rover_columns`.
+    note. Where all of a channel are zero they stay, and one that is not positive counts as
+    undeclared; with `refuse_zeros` they raise `FitError`. The table has the columns of
+    `with_rover_columns`.
     """
     names = tuple(n for n in CHANNELS if column(n) in table and np.isfinite(table[column(n)]).any())
     own_runs = table["run"] if "run" in table else np.zeros(len(table), dtype=np.int64)
@@ -333,11 +334,33 @@ def _without_zeros(
     if others.size == 0 and refuse:
         raise FitError(f"{found}, and no row has a larger one; declare one such as '2 % + 0.05'")
     if others.size == 0:
-        return np.where(zero, np.nan, std), []
+        return np.where(std > 0.0, std, np.nan), []
     median, more = float(np.median(others)), int(zero.sum()) - 1
     text = f"{found} replaced by the column's median {median:.3g}"
     text += f"; {more} more rows likewise" if more else ""
     return np.where(zero, median, std), [Remark("zero-noise", text, (key,))]
+
+
+def even_part(group: Integers, most: int) -> Integers:
+    """At most so many of n items: as many of each group (n,), or all of few, spread over it.
+
+    Of more groups than that, the items are taken as one. An item is drawn at random from each of as
+    many stretches, so that none of a repeated pattern is missed.
+    """
+    size = np.bincount(group)
+    least, above = 0, int(size.max()) + 1
+    while above - least > 1:
+        middle = (least + above) // 2
+        fits = np.minimum(size, middle).sum() <= most
+        least, above = (middle, above) if fits else (least, middle)
+    if least == 0:
+        return even_part(np.zeros_like(group), most)
+    draws, chosen = np.random.default_rng(0), []
+    for own in np.split(np.argsort(group, kind="stable"), np.cumsum(size)[:-1]):
+        count = min(len(own), least)
+        ends = np.arange(count + 1) * len(own) // max(count, 1)
+        chosen.append(own[draws.integers(ends[:-1], ends[1:])])
+    return np.sort(np.concatenate(chosen))
 
 
 def declared_std(case: Case, table: Table, key: str) -> Floats:

@@ -13,6 +13,7 @@ from soilml.inference import constants
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Names, Posterior
 from soilml.remarks import Remark
+from soilml.report.numbers import format_quantity
 
 LISTED_SUSPECTS = 8  # Suspects that are listed
 #: Why nothing is named where the evidence for the suspects is weak.
@@ -83,7 +84,7 @@ def decide(
     ranked = ranked_sets(posterior)
     chance = posterior.probability(*ranked[0]) if ranked else 0.0
     if _is_other_soil(posterior) and none > max(constants.UNCERTAIN, chance):
-        return Decision("undecided", reasons=reasons)
+        return Decision("undecided", reasons=(soil_outside_priors(posterior),))
     hopeless = 1.0 - constants.UNCERTAIN if obstacles else 0.0
     if not ranked or (none > constants.UNCERTAIN and none > max(chance, hopeless)):
         return Decision("not-testable" if obstacles else "unknown", reasons=reasons)
@@ -117,6 +118,42 @@ def _is_other_soil(posterior: Posterior) -> bool:
     """Whether the soil alone is likeliest outside its priors, without a discrepancy."""
     alone = next((n for n in posterior.nodes if not n.hypothesis.effects), None)
     return alone is not None and alone.hypothesis.wide_priors and alone.share_without > 0.5
+
+
+def pressed_priors(fit: Solution) -> dict[str, str]:
+    """The soil parameters that a fit has at an end of their prior, by path, in words."""
+    found = {}
+    for c, x in zip(fit.coordinates, fit.x, strict=True):
+        if not c.effect and min(x - c.lower, c.upper - x) < constants.PRESSED:
+            end, bound = ("lower", c.prior.lower) if x < 0.5 else ("upper", c.prior.upper)
+            value = format_quantity(bound, c.unit)
+            found[c.path] = f"{c.name.replace('_', ' ')} at {value}, the {end} end of its prior"
+    return found
+
+
+def opened_priors(posterior: Posterior) -> tuple[Remark, ...]:
+    """That the likeliest explanation lies outside the priors of the soil, which forbids a name."""
+    best = posterior.best.hypothesis
+    if not best.wide_priors:
+        return ()
+    if not best.effects:
+        return (soil_outside_priors(posterior),)
+    pressed, why = _within_priors(posterior)
+    return (Remark("prior-opened", f"the priors of the soil were opened: {why}", pressed),)
+
+
+def soil_outside_priors(posterior: Posterior) -> Remark:
+    """That the soil alone explains the rows where its priors are opened."""
+    pressed, why = _within_priors(posterior)
+    text = f"a soil outside its priors explains the rows: {why}"
+    return Remark("soil-outside-priors", text, pressed)
+
+
+def _within_priors(posterior: Posterior) -> tuple[tuple[str, ...], str]:
+    """The soil parameters at ends of their priors, and what a fit within these is like."""
+    pressed = pressed_priors(posterior.soil.fit)
+    why = f"within them, the fit has {'; '.join(pressed.values()) or 'a large remainder'}"
+    return tuple(pressed), why
 
 
 def _reason(code: str, names: Names) -> Remark:

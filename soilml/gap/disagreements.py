@@ -9,20 +9,16 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.misfit import Misfit, excess_residuals_remark, misfit_limit
+from soilml.gap.decision import pressed_priors
 from soilml.gap.held_out import FITTED
 from soilml.gap.results import GapReduction
 from soilml.identification.fit import disagreeing_soil_tests
-from soilml.inference.constants import PRESSED, SCATTER_UNITS
+from soilml.inference import constants
 from soilml.inference.posterior import Posterior
 from soilml.quantities import column
 from soilml.remarks import Remark
-from soilml.report.numbers import decimal, format_quantity
+from soilml.report.numbers import decimal
 
-#: Estimated over declared noise from which the noise counts as scaled up. Its standard error is
-#: about 10 % with the usual fifty degrees of freedom of a channel.
-NOISE_SCALED_UP = 1.3
-#: Run-to-run standard deviation, in usual ones, above which runs disagree with each other.
-UNUSUAL_RUN_EFFECT = 3.0
 #: Mean squared residual of rows kept back that scatter of a few runs seldom leaves: of two runs,
 #: once in fifty times.
 UNEXPLAINED = 4.0
@@ -45,14 +41,14 @@ def disagreements(
     found = _excess_residuals(posterior, case, misfit, alone)
     at = soil.without.at
     for name, scale in zip(terms.readings.channels, terms.noise_scale(at), strict=True):
-        if scale >= NOISE_SCALED_UP:
+        if scale >= constants.NOISE_SCALED_UP:
             size = f"those of {column(name)} {decimal(scale, 2)} times as much"
             text = f"readings scatter more than their declared noise: {size}"
             found.append(Remark("noise-scaled", text, (column(name),)))
     angle, bearing = terms.scatter(at)
-    if max(angle, bearing) >= UNUSUAL_RUN_EFFECT:
-        degrees = np.degrees(angle * SCATTER_UNITS["friction_angle"])
-        share = bearing * SCATTER_UNITS["bearing"]
+    if max(angle, bearing) >= constants.UNUSUAL_RUN_EFFECT:
+        degrees = np.degrees(angle * constants.SCATTER_UNITS["friction_angle"])
+        share = bearing * constants.SCATTER_UNITS["bearing"]
         text = (
             "runs differ from each other like different soils: their friction angle varies by "
             f"{degrees:.2g} deg, and their bearing strength by {share:.0%}"
@@ -100,28 +96,3 @@ def _excess_residuals(
         return [Remark("soil-at-prior", text, tuple(pressed))]
     consequence = "no scatter from run to run accounts for them"
     return [excess_residuals_remark(misfit.factor, case, consequence)]
-
-
-def pressed_priors(fit: Solution) -> dict[str, str]:
-    """The soil parameters that a fit has at an end of their prior, by path, in words."""
-    found = {}
-    for c, x in zip(fit.coordinates, fit.x, strict=True):
-        if not c.effect and min(x - c.lower, c.upper - x) < PRESSED:
-            end, bound = ("lower", c.prior.lower) if x < 0.5 else ("upper", c.prior.upper)
-            value = format_quantity(bound, c.unit)
-            found[c.path] = f"{c.name.replace('_', ' ')} at {value}, the {end} end of its prior"
-    return found
-
-
-def opened_priors(posterior: Posterior) -> tuple[Remark, ...]:
-    """That the likeliest explanation lies outside the priors of the soil, which forbids a name."""
-    best = posterior.best
-    if not best.hypothesis.wide_priors:
-        return ()
-    pressed = pressed_priors(posterior.soil.fit)
-    why = f"within them, the fit has {'; '.join(pressed.values()) or 'a large remainder'}"
-    if best.hypothesis.effects:
-        text = f"the priors of the soil were opened: {why}"
-        return (Remark("prior-opened", text, tuple(pressed)),)
-    text = f"a soil outside its priors explains the rows: {why}"
-    return (Remark("soil-outside-priors", text, tuple(pressed)),)

@@ -86,14 +86,16 @@ def _faults(report: GapReport) -> str:
     return f"{count} fault{'s' if count > 1 else ''} in the data or the model file."
 
 
-def _beside(report: GapReport) -> str:
-    """What counts as noise beside that of the sensors: a declared discrepancy, and scatter."""
+def _noise(report: GapReport) -> str:
+    """What counts as noise: that of the sensors, a declared discrepancy, and scatter."""
     declared = any(not one.learned for one in report.model.discrepancy.values())
-    parts = ["the declared discrepancy"] if declared else []
+    parts = ["noise", *(["declared discrepancy"] if declared else [])]
     found = report.variance_components
     angle = math.degrees(found.get("friction_angle_std", 0.0))
-    parts += [f"a scatter of {decimal(angle, 2)} deg from run to run"] if angle > 0.0 else []
-    return f", {' and '.join(parts)}" if parts else ""
+    if angle > 0.0:
+        parts.append(f"{decimal(angle, 2)} deg of scatter between runs")
+    *others, last = parts
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 #: What stands in the templates of `STATUSES`.
@@ -107,7 +109,7 @@ _WORDS = {
     "residual": lambda report: format_residual(report.gap["train"].before),
     "size": _size,
     "faults": _faults,
-    "beside": _beside,
+    "noise": _noise,
 }
 
 

@@ -23,7 +23,7 @@ class Verdict:
 STATUSES = {
     "no-gap": Verdict(
         "model and measurements agree within the noise",
-        "Model and measurements agree within the noise{beside}: mean squared residual {residual}, "
+        "Model and measurements agree within the {noise}: mean squared residual {residual}, "
         "probability of a gap {gap}.",
         "Use the model as it is, within the measured range of slip and load.",
         "good",

@@ -21,8 +21,8 @@ from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.usable_readings import prepared_rows
 from soilml.gap.cause_of_remainder import described_cause
 from soilml.gap.checks import estimate_repeat_noise, faults_of, naming_obstacles
-from soilml.gap.decision import Decision, decide, ranked_sets, suspects
-from soilml.gap.disagreements import disagreements, opened_priors
+from soilml.gap.decision import Decision, decide, opened_priors, ranked_sets, suspects
+from soilml.gap.disagreements import disagreements
 from soilml.gap.estimates import (
     named_effects,
     returned_case,

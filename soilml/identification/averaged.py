@@ -95,8 +95,7 @@ def averaged_samples(
         raise_uncarried(case, readings.at)
     if found.refused is not None:
         raise_uncarried(case, readings.at)
-    # residuals above the noise may be scatter of the soil from run to run, as `gap` decides too
-    rejected = misfit.exceeds_noise and found.no_gap <= constants.LIKELIER
+    rejected = misfit.exceeds_noise and not found.scatters
     fixed, inner = shared_columns(found.soil.fit.fitted(), found.terms.readings, free)
     found = found.beside(fixed, inner)
     u, weights = map(

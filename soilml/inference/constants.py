@@ -109,6 +109,11 @@ INTERVAL_FACTOR = 1.35
 #: Probability of no gap from which none is stated, and of the members of a class together, below
 #: which no cause is: more likely than not.
 LIKELIER = 0.5
+#: Estimated over declared noise from which the noise counts as scaled up. Its standard error is
+#: about 10 % with the usual fifty degrees of freedom of a channel.
+NOISE_SCALED_UP = 1.3
+#: Run-to-run standard deviation, in usual ones, above which runs disagree with each other.
+UNUSUAL_RUN_EFFECT = 3.0
 #: Probability, causes outside the catalogue included, from which a single explanation is named.
 NAMED_PROBABILITY = 0.9
 #: Probability that no effect is present from which none is claimed, and from which no class is.

@@ -223,6 +223,17 @@ class Posterior:
             share = 1.0
         return self.node_weight(own) * share
 
+    @property
+    def scatters(self) -> bool:
+        """Whether usual scatter of the soil from run to run accounts for residuals above the noise.
+
+        There is no gap, and the noise of no channel is far above the declared one.
+        """
+        terms, at = self.terms, self.soil.without.at
+        noise, scatter = terms.noise_scale(at).max(), terms.scatter(at).max()
+        usual = noise < constants.NOISE_SCALED_UP and scatter < constants.UNUSUAL_RUN_EFFECT
+        return bool(usual and scatter > 0.0 and self.no_gap > constants.LIKELIER)
+
     @cached_property
     def outside(self) -> float:
         """Probability of a gap with a cause that no effect of the catalogue describes.

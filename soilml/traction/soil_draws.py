@@ -140,9 +140,10 @@ def _exact_soil(case: Case, table: Table, free: Sequence[str] | None) -> Measure
     case = one_of(case, "the case")
     unknown, whole = select_free(case, free), usable_readings(case, table)
     check_declared(whole)
-    samples = posterior_samples(case, whole.thinned(), unknown)
+    part = whole.thinned()
+    samples = posterior_samples(case, part, unknown)
     x = samples.sample.u[samples.equally_weighted(DRAWS)]
-    warnings = [*whole.notes]
+    warnings = [*part.notes]
     if samples.rejected:
         consequence = "bands are widened and may be biased"
         warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))

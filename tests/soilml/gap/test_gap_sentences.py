@@ -66,13 +66,16 @@ def test_agreement_is_within_the_noise_and_what_counts_as_noise():
     begin = "Model and measurements agree within the noise"
     assert said("no-gap") == f"{begin}: {expected}"
     declared = replace(case_of(), discrepancy={"torque_Nm": Discrepancy(share=0.02)})
-    assert said("no-gap", model=declared) == f"{begin}, the declared discrepancy: {expected}"
+    assert said("no-gap", model=declared) == f"{begin} and declared discrepancy: {expected}"
     learned = {"torque_Nm": Discrepancy(constant=0.02, learned=True)}
     assert said("no-gap", model=replace(case_of(), discrepancy=learned)) == f"{begin}: {expected}"
     scatter = {"friction_angle_std": 0.0105, "bearing_std": 0.06}
-    assert said("no-gap", variance_components=scatter) == (
-        f"{begin}, a scatter of 0.60 deg from run to run: {expected}"
-    )
+    scattering = "0.60 deg of scatter between runs"
+    alone = said("no-gap", variance_components=scatter)
+    assert alone == f"{begin} and {scattering}: {expected}"
+    both = said("no-gap", variance_components=scatter, model=declared)
+    assert both == f"{begin}, declared discrepancy and {scattering}: {expected}"
+    assert len(both.split()) <= HEADLINE_WORDS
 
 
 def test_what_was_tried_is_told_with_what_was_left_out():

@@ -117,3 +117,11 @@ def test_scatter_of_the_soil_from_run_to_run_is_no_misfit():
     loads, soils = (40.0, 60.0, 90.0, 140.0, 50.0, 75.0), {"kphi": case.soil.kphi * factors}
     fit = identify(case, driven(case, loads=loads, soils=soils, seed=1))
     assert fit.misfit > 4.0 and fit.fits
+
+
+def test_noise_far_above_the_declared_one_is_a_misfit_though_it_is_no_gap():
+    case = case_of()
+    table = driven(case, noise=3.0, seed=1)
+    fit = identify(case, table)
+    assert not fit.fits and fit.misfit > 4.0
+    assert gap(case, table).status == "undecided"
