@@ -73,7 +73,7 @@ def compare() -> None:
         command("identify", MODEL, drive, "--method", method, "--out", out)
     test = str(OUT / "test.parquet")
     command("generate", "wheel_test", test)
-    command("compare", MODEL, test, *FILES.values(), "--out", str(OUT), "--analytic-sets", "10")
+    command("compare", MODEL, test, *FILES.values(), "--out", str(OUT))
     print(f"\nThe drive of {len(log)} readings:\n\n{drive_table(log)}")
 
 

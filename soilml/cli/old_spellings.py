@@ -34,6 +34,7 @@ OPTIONS: Mapping[str, Mapping[str, str]] = {
     "bevameter": {"--json": "--out"},
     "drive slip": {"--json": "--out"},
     "estimate": {"--case": "--model"},
+    "export c": {"--rows": "--step-rows"},
     "export slip": {"--soils": "--draws"},
     "export soil": {"--run": "--group"},
     "paper numbers": {"--json": "--out"},

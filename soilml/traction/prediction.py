@@ -89,14 +89,23 @@ def prediction_warnings(
             yield Remark("not-identified", text, (name,))
         elif fraction > WEAKLY_IDENTIFIED_ABOVE:
             yield Remark("weakly-identified", f"the {name} is weakly identified: {width}", (name,))
-    loads = np.ravel(vehicle.loads(np.zeros(1)))
+    level = np.ravel(vehicle.loads(np.zeros(1)))
+    loads = level
+    if len(vehicle.wheels) > 1:  # which share the weight by the slope
+        loads = np.concatenate([level, *own.loads.values()])
     yield from extrapolations(own.curve_slip, loads, measured, error_included)
     if own.failed_fraction > 0.0:
         text = (
-            f"{own.failed_fraction:.0%} of the soils and slips do not carry {loads.max():.4g} N "
+            f"{own.failed_fraction:.0%} of the soils and slips do not carry {level.max():.4g} N "
             "and are excluded"
         )
         yield Remark("not-carried", text)
+    if 0.0 < own.still_fraction <= FEWEST:
+        yield Remark(
+            "does-not-move",
+            f"{own.still_fraction:.0%} of the soils do not let it move: the bands of its steepest "
+            "slope are those of the others",
+        )
     at_end = np.nan_to_num(own.steepest_slope) > vehicle.steepest - 1e-3
     if len(vehicle.wheels) > 1 and at_end.mean() > 0.05:
         text = f"a wheel leaves the ground at {np.rad2deg(vehicle.steepest):.1f} deg"

@@ -69,7 +69,8 @@ class PullReport(Result):
 
     def report(self, title: str = "Drawbar pull and slopes") -> Report:
         """Largest pull and steepest slope, curves and slopes, and what limits them."""
-        vague, still = self.vague, self.by_load[0].posterior.still_fraction
+        vague = self.vague
+        moves = [one.posterior.still_fraction <= FEWEST for one in self.by_load]
         under: dict[Remark, list[str]] = {}
         for one in self.by_load:
             for remark in one.warnings:
@@ -81,8 +82,8 @@ class PullReport(Result):
         status, tone = "predicted", "good"
         if all(vague) or any(vague):
             status, tone = "not known" if all(vague) else "partly known", "warn"
-        if still > FEWEST:
-            status, tone = "does not move", "bad"
+        if not all(moves):
+            status, tone = "moves under some loads" if any(moves) else "does not move", "bad"
         return Report(
             kind="pull",
             verdict=sentences[0],
@@ -252,9 +253,6 @@ def _lines(one: TractionPrediction) -> Iterator[str]:
     if np.isfinite(one.prior.steepest_slope).any():
         before = quantile_band(one.prior.steepest_slope).text("rad")
         yield f"Before the rows, the steepest slope was {before}."
-    if own.still_fraction > 0.0:
-        share = format_quantity(own.still_fraction, "share", digits=2)
-        yield f"{share} of the soils do not let it move."
 
 
 def _table_of_loads(loads: Sequence[TractionPrediction]) -> ReportTable:

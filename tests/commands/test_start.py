@@ -89,3 +89,13 @@ def test_loading_a_model_leaves_no_trace_of_telemetry(small_model, tmp_path, cho
     assert done.stdout.strip() == (chosen or "1")
     if chosen is None:
         assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_estimate_runs_by_the_libraries_of_the_board_alone(small_model, model_file, tmp_path):
+    (tmp_path / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.2,60,3.0\na,0.4,60,4.2\n")
+    words = "estimate", small_model, tmp_path / "runs.csv", "--by", "run", "--model", model_file
+    loaded, printed = modules_after(*words)
+    assert any("cohesion" in line for line in printed)
+    libraries = {name.split(".")[0] for name in loaded}
+    ground = {"scipy", "sklearn", "torch", "onnx", "jinja2", "matplotlib", "pandas", "pyarrow"}
+    assert {"numpy", "onnxruntime"} <= libraries and not libraries & ground

@@ -16,7 +16,7 @@ RELEASED = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel")
 
 DESCRIPTION = """\
 Score model files, analytic identification and the prior on sets of readings
-whose soil is known: RMSE, coverage of 50 and 90 % intervals, failures, and
+whose soil is known: RMSE, coverage of 90 % intervals, failures, and
 time per estimate. RMSE is also given relative to the Bayes limit: the exact
 posterior mean of the same sets, which no estimator can beat on average.
 

@@ -35,6 +35,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.config.simulator import emulator_of, read_runs
     from soilml.errors import InputError
     from soilml.experiment_design import simulator_runs as runs
+    from soilml.io.atomic_files import check_outputs
     from soilml.optional_imports import need
 
     need("scipy", "plan runs")
@@ -47,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
             f"{args.model} [simulator] has its runs within it; needed is table, the file of them"
         )
     if simulator.runs.is_file():
+        check_outputs([args.out] if args.out else [], [str(simulator.runs)])
         earlier = read_runs(simulator.runs)
         made = emulator_of(earlier, simulator.gear, case.prior)
         tell("\n".join(runs.emulator_errors(earlier, *made)))

@@ -46,7 +46,11 @@ def run(args: argparse.Namespace) -> int:
 
 def _libraries() -> Iterator[tuple[str, str | None]]:
     """Libraries and the extra of each, None where everything needs it."""
-    for text in metadata.requires("soilml") or ():
+    try:
+        needed = metadata.requires("soilml") or []
+    except metadata.PackageNotFoundError:  # run from its folder, without being installed
+        needed = ["numpy", "onnxruntime"]
+    for text in needed:
         found = _REQUIRED.match(text)
         if found and found[1] != "tomli" and found[2] not in _DEVELOPMENT:
             yield found[1], found[2]

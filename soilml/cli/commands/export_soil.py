@@ -51,7 +51,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Write the folder and say what is in it."""
-    from soilml.cli.output import show_result
+    from soilml.cli.output import show_result, tell
     from soilml.soil_export import export_soil
 
     given = named_numbers(args.set, "--set", "NAME=NUMBER, such as elastic_K=1e8")
@@ -69,4 +69,5 @@ def run(args: argparse.Namespace) -> int:
         words=words,
     )
     show_result(export.report(), {})
+    tell(f"\nwritten to {args.out}; README.txt has the same with all details")
     return 0

@@ -62,6 +62,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.physics.soils import soil_catalogue
 
     if args.what == "models":
+        if args.name is not None:
+            raise InputError(f"`soilml estimate {args.name}` says what one model file is for")
         report, content = _models()
     elif args.what == "soils":
         soils = _chosen(soil_catalogue(), args.name)

@@ -62,6 +62,8 @@ def run(args: argparse.Namespace) -> int:
     known = args.known is not None
     if known and args.by is not None:
         raise InputError("--by asks for a soil of each group; --known gives the slip of each row")
+    if not known and (args.torque_model, args.vibration_model) != ("simplified", "linear"):
+        raise InputError("--torque-model and --vibration-model need --known, a soil")
     need = ("run",) if known else ("run", "slip")
     table = read_table(args.runs, need, filled=need, ignore_extra=args.ignore_extra)
     return _slip(args, table) if known else _soil(args, table)

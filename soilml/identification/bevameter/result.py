@@ -104,7 +104,7 @@ class BevameterResult(Result):
         }
 
     def as_json(self) -> dict[str, Any]:
-        """The content of the file that `soilml bevameter --json` writes."""
+        """The content of the file that `soilml bevameter --out FILE.json` writes."""
         return {
             "estimates": {name: e.as_json() for name, e in self.estimates().items()},
             "soil": self.soil,

@@ -135,6 +135,8 @@ def test_plan_runs_proposes_runs_and_more_where_the_emulator_is_unsure(workplace
     assert main(["plan", "runs", "model.toml", "--count", "10", "--out", "more.csv"]) == 0
     assert "error of the emulator of torque_Nm: " in capsys.readouterr().err
     assert len(read_table("more.csv", filled=())) == 10
+    assert main(["plan", "runs", "model.toml", "--out", "simulated.csv"]) == 2
+    assert "simulated.csv is an input and would be overwritten" in capsys.readouterr().err
     assert read_case("model.toml").simulator.error["torque_Nm"] > 0.0
 
 

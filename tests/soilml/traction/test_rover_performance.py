@@ -14,6 +14,8 @@ from soilml.config.wheeled_rover import RoverWheel, WheeledRover
 from soilml.physics.effects import EFFECTS
 from soilml.traction import DrivenVehicle, performance, pull_report
 from soilml.traction.draws import SoilDraws
+from soilml.traction.measured_range import MeasuredRange
+from soilml.traction.prediction import predicted
 
 NAMES = ("cohesion", "friction_angle", "shear_modulus")
 SOIL = np.asarray([900.0, 0.6, 0.012])
@@ -59,6 +61,16 @@ def test_the_steepest_slope_takes_all_the_pull_there_is(case):
     assert pull == pytest.approx(case.rover.weight * np.sin(slope), rel=1e-6)
     beyond = performance(DrivenVehicle.of_rover(case), draws(), np.asarray([slope * 1.01]), SLIP)
     assert beyond.climbed[0] == 0.0 and np.isnan(beyond.slip[0, 0]) and beyond.margin[0, 0] < 0.0
+
+
+def test_loads_on_slopes_that_no_row_had_are_said(case):
+    measured, found = MeasuredRange((0.0, 0.6), (65.0, 80.0)), {}
+    for degrees in (0.0, 25.0):
+        slopes = np.deg2rad([degrees])
+        vehicle = DrivenVehicle.of_rover(case)
+        found[degrees] = predicted(vehicle, draws(), draws(), slopes, SLIP, measured).warnings
+    assert remarked(found[25.0], "no load below 65 N was measured")
+    assert not remarked(found[0.0], "no load")
 
 
 def passes(case):
