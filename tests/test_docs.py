@@ -90,6 +90,6 @@ def test_links_lead_to_files_and_named_files_exist(subtests):
         text = page.read_text()
         targets = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text)
         files = [page.parent / t for t in targets if not t.startswith(("http://", "https://"))]
-        with subtests.test(page.relative_to(ROOT)):
+        with subtests.test(str(page.relative_to(ROOT))):
             assert not [f for f in files if not f.exists()]
             assert not [path for path in re.findall(named, text) if not (ROOT / path).exists()]

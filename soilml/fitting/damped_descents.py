@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import Linearisation
+from soilml.numerics.prior import Prior
 
 #: Iterations after which a descent is abandoned as not converged; typical fits need five to ten.
 MAX_ITERATIONS = 50
@@ -22,6 +24,9 @@ AFTER_KEPT, AFTER_LESS, AFTER_NOTHING = 0.1, 10.0, 1e2
 MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
 #: Damping, and curvature of a coordinate that changes nothing, with which a step is defined.
 LEAST_DAMPING, LEAST_SCALE = 1e-9, 1e-9
+#: A parameter whose positive bounds differ by this ratio moves by ratios: valleys of the objective
+#: along it and an exponent are straight in its logarithm, which a step may raise by so much.
+RATIO_OF_BOUNDS, MOST_LOG_STEP = 3.0, 2.0
 NEGLIGIBLE_STEP = 1e-3  # Change of all coordinates in which a step that brings nothing is the last
 
 
@@ -122,19 +127,32 @@ def descend(
 def _step(at: Solution, damping: float) -> tuple[float, Floats]:
     """What an undamped step promises, and where a damped one leads, (p,).
 
-    The promise is the decrease of the linearised objective, up to the bounds.
+    The promise is the decrease of the linearised objective, up to the bounds. Where a coordinate
+    moves by ratios, its step is one of the logarithm of the parameter.
     """
     problem, x = at.problem, at.x
     deviation, rates = problem.terms.deviation(x), problem.terms.rates(x)
     normal = at.jacobian.T @ at.jacobian + rates.T @ rates
     descent = at.residual @ at.jacobian - deviation @ rates
     scale = np.diag(np.diag(normal) + LEAST_SCALE)
-    ends = problem.lower - x, problem.upper - x
+    low, high = problem.lower - x, problem.upper - x
+    priors = [c.prior for c in problem.coordinates]
+    ratio = np.asarray([_moves_by_ratios(prior) for prior in priors])
+    size = x[ratio] + [p.lower / (p.upper - p.lower) for p in compress(priors, ratio)]
+    low[ratio] = size * np.log1p(low[ratio] / size)
+    high[ratio] = size * np.minimum(np.log1p(high[ratio] / size), MOST_LOG_STEP)
     full, step = (
-        bounded_step(normal + factor * scale, descent, *ends) for factor in (LEAST_DAMPING, damping)
+        bounded_step(normal + factor * scale, descent, low, high)
+        for factor in (LEAST_DAMPING, damping)
     )
     promised = float(2.0 * descent @ full - full @ normal @ full)
+    step[ratio] = size * np.expm1(step[ratio] / size)
     return promised, np.clip(x + step, problem.lower, problem.upper)
+
+
+def _moves_by_ratios(prior: Prior) -> bool:
+    wide = prior.lower > 0.0 and prior.upper > RATIO_OF_BOUNDS * prior.lower
+    return wide and not prior.log and prior.normal_std is None
 
 
 def bounded_step(normal: Floats, descent: Floats, low: Floats, high: Floats) -> Floats:

@@ -35,7 +35,8 @@ def test_bands_of_pull_have_the_error_of_the_model_and_say_so(folder, capsys):
     command = ("--load", "60", "--slip-limit", "0.4", "--exact-model")
     wide = spoken(capsys, "pull", "model.toml", "runs.csv", *command)
     details = spoken(capsys, "pull", "model.toml", "runs.csv", *command, "-v")
-    assert "errors of the model (drawbar pull" in " ".join(details.err.split())
+    said = " ".join(details.err.split())
+    assert "the noise and errors of the model (torque" in said and "drawbar pull" in said
     for row in rows_of(wide.out):
         # the error alone is a band of 2 * 1.645 * 1.5 N = 4.9 N; 400 draws tell it within 15 %
         assert float(row["drawbar_pull_N_p95"]) - float(row["drawbar_pull_N_p05"]) > 0.85 * 4.9

@@ -50,12 +50,17 @@ def test_a_signal_ends_it_in_one_line_and_removes_its_files(name, tmp_path):
 def test_a_worker_ends_with_its_server(tmp_path):
     """Even where the server is killed: the worker sees the end of its input."""
     process = at_work(tmp_path)
+    wait_for(lambda: bool(_workers_below(tmp_path)))
     process.kill()
     process.communicate(timeout=60)
+    wait_for(lambda: not _workers_below(tmp_path))
+
+
+def wait_for(condition):
     until = time.monotonic() + 60.0
-    while _workers_below(tmp_path) and time.monotonic() < until:
+    while not condition():
+        assert time.monotonic() < until
         time.sleep(0.1)
-    assert not _workers_below(tmp_path)
 
 
 def _workers_below(folder):
