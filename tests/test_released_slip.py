@@ -47,7 +47,6 @@ def error_and_cover(found, slip):
 def test_the_files_of_both_sensors_have_the_same_held_out_rows(soil):
     one, other = (f.errors for f in files(soil))
     assert len(np.intersect1d(one.rows, other.rows)) > 1900
-    assert one.common_share()[0] > 0.9  # the model's error on a soil, not the sensor's noise
 
 
 @pytest.mark.slow

@@ -22,7 +22,9 @@ from soilml.remarks import Remark
 _MISSING = 0.2  # Largest share of missing samples in a stance
 _SLOWER = 2.0  # A stance that lasts so many times as long as usual has a rest in it
 _WHOLE, _AT_REST = 0.95, 0.01  # Least part of a stance that is seen, and what is no motion yet
-_WILD = 8.0  # How many times the usual difference from its neighbours a wild sample has
+#: How many times the usual difference from its neighbours a wild sample has, and how many of them
+#: on either side it is compared with.
+_WILD, _BESIDE = 12.0, 5
 _DESPIKED = ("torque", "motor_current", "load", "clearance", "vibration")
 
 
@@ -30,7 +32,7 @@ def leg_angle(inputs: Inputs, wheel: WheelMap) -> Floats:
     """Angle (n,) of a wheel-leg since its first midstance, rad, growing with the motion.
 
     The channels become those of a wheel: the rotation as said above, [clearance] as with the leg
-    vertical (eq. 10), [vibration] without gravity, all without single wild samples.
+    vertical (eq. 10), [vibration] without gravity, all without wild samples.
     Raises `InputError` where no encoder gives the angle.
     """
     leg, values = wheel.leg, inputs.values
@@ -48,7 +50,7 @@ def leg_angle(inputs: Inputs, wheel: WheelMap) -> Floats:
     for role in (role for role in _DESPIKED if role in values):
         values[role], count = _without_wild_samples(values[role])
         if count:
-            text = f"[{role}]: {count} single wild samples are left out"
+            text = f"[{role}]: {count} wild samples are left out"
             inputs.notes.append(Remark("spikes", text, (role,), severity="note"))
     if "clearance" in values:
         values["clearance"] = values["clearance"] + leg.length.value * (1.0 - np.cos(since))
@@ -58,11 +60,22 @@ def leg_angle(inputs: Inputs, wheel: WheelMap) -> Floats:
 
 
 def _without_wild_samples(values: Floats) -> tuple[Floats, int]:
-    """Samples (n,) with single wild ones as NaN, and how many; they differ from both neighbours."""
-    before, after = (np.r_[0.0, np.diff(values)], np.r_[-np.diff(values), 0.0])
-    off = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
-    wild = off > _WILD * float(np.nanpercentile(np.abs(before), 90))
-    return np.where(wild, np.nan, values), int(wild.sum())
+    """Samples (n,) with wild ones, single or two in a row, as NaN, and how many they are.
+
+    They are off the median of five by much more than samples usually are, and by more than those
+    beside them vary: the peaks of an oscillation are not wild.
+    """
+    known, found = np.flatnonzero(np.isfinite(values)), values.copy()
+    if known.size <= 2 * _BESIDE:
+        return found, 0
+    own = np.pad(values[known], _BESIDE, mode="reflect")
+    parts = np.lib.stride_tricks.sliding_window_view(own, 2 * _BESIDE + 1)
+    off = np.abs(values[known] - np.median(parts[:, _BESIDE - 2 : _BESIDE + 3], axis=1))
+    beside = np.delete(parts, [_BESIDE - 1, _BESIDE, _BESIDE + 1], axis=1)
+    usual = float(np.median(off[off > 0.0])) if np.any(off > 0.0) else np.inf
+    wild = known[(off > _WILD * usual) & (off > np.ptp(beside, axis=1))]
+    found[wild] = np.nan
+    return found, int(wild.size)
 
 
 def stances(
@@ -106,13 +119,15 @@ def stances(
         yield Stretch(whole.start, whole.stop, why), middle
 
 
-def largest_acceleration(inputs: Inputs, start: float, stop: float) -> tuple[float, float]:
-    """Largest size of the vertical acceleration in a stretch, and its error; NaN without one.
+def largest_acceleration(inputs: Inputs, stance: Stretch, within: Stretch) -> tuple[float, float]:
+    """Largest size of the vertical acceleration after midstance, and its error; NaN without one.
 
-    That of one sample is the noise, by the second differences of all samples.
+    That of one sample is the noise, by the second differences of all samples. The end of the
+    stance, which is no part of its stretch, counts: a leg that slips by jerks shakes most there.
     """
-    values = inputs.values["vibration"]
-    own = values[inputs.within(start, stop)]
+    values, lasts = inputs.values["vibration"], stance.stop - stance.start
+    end = stance.stop + lasts * _AT_REST / (1.0 - 2.0 * _AT_REST)
+    own = values[inputs.within((within.start + within.stop) / 2.0, end)]
     if np.mean(~np.isfinite(own)) > _MISSING:
         return float("nan"), float("nan")
     bends = np.abs(np.diff(values, 2))

@@ -120,9 +120,8 @@ class WheelRows:
                 continue
             row = window_row(stretch, inputs, quantities, one.run, self.conversion, within)
             if within is not None and "vibration" in inputs.values:
-                middle = (within.start + within.stop) / 2.0
-                found_in = largest_acceleration(inputs, middle, stretch.stop)
-                row.values["vibration"], row.std["vibration"] = found_in
+                largest, error = largest_acceleration(inputs, stretch, within)
+                row.values["vibration"], row.std["vibration"] = largest, error
             rows.append(row)
         return rows
 

@@ -12,9 +12,9 @@ from training.dataset import Dataset
 
 Rows = NDArray[np.int64]
 MOST_ROWS = 2000  # Most rows that a file carries
-#: Numbers of repeated readings at which the error of their mean is measured.
-REPEATS = (1, 2, 4, 8, 16)
-#: Least number of groups for a 90 % quantile, and most groups of one run, so that none dominates.
+#: Numbers of repeated readings by which the share of their errors in common is measured.
+REPEATS = (2, 4, 8, 16)
+#: Least number of groups for that, and most groups of one run, so that none dominates.
 LEAST_GROUPS, MOST_GROUPS_OF_A_RUN = 50, 4
 #: An operating condition counts as steady in a run whose standard deviation of it is up to this
 #: share of that of all rows.
@@ -22,42 +22,40 @@ STEADY = 0.2
 SAME_TARGET = 0.01  # A target counts as the same in all rows of a run up to this share of its range
 
 
-def measure_held_out(
-    mean: Floats, std: Floats, data: Dataset, coverage_factor: Floats
-) -> HeldOutErrors:
-    """The errors of a file on rows that it has not seen, and of repeated readings of one soil.
-
-    Repeats are runs at one slip and load; without `LEAST_GROUPS` of them, repeated readings count
-    as one.
+def measure_held_out(mean: Floats, std: Floats, data: Dataset) -> HeldOutErrors:
+    """The errors of a file on rows that it has not seen, one of each run.
 
     mean, std (n, q): Estimates of the rows of `data`.
-    coverage_factor (q,): Half-width of the 90 % interval of one reading, in standard deviations.
     """
     first = np.asarray([run[0] for run in data.runs()])
     if len(first) > MOST_ROWS:
         first = first[np.linspace(0, len(first) - 1, MOST_ROWS).astype(int)]
     first = first[np.argsort(data.row[first])]
-    repeats, size, factor = [1], [np.ones(mean.shape[1])], [coverage_factor]
-    runs = steady_runs(data)
-    one = _size_and_quantile(row_groups(runs, 1), data.targets, mean, std)
-    for count in REPEATS[1:]:
-        groups = row_groups(runs, count)
-        if len(groups) < LEAST_GROUPS:
-            break
-        many = _size_and_quantile(groups, data.targets, mean, std)
-        repeats.append(count)
-        size.append(np.minimum(many[0] / one[0], size[-1]))
-        factor.append(coverage_factor * (many[1] / many[0]) / (one[1] / one[0]))
     found = {
         "rows": data.row[first].tolist(),
         "truth": data.targets[first].tolist(),
         "mean": mean[first].tolist(),
         "std": std[first].tolist(),
-        "repeats": repeats,
-        "repeat_std": size,
-        "repeat_coverage_factor": factor,
     }
     return HeldOutErrors.of(HeldOutErrors.of(found).entry())  # as it is read back from the file
+
+
+def common_share(mean: Floats, std: Floats, data: Dataset) -> Floats:
+    """Share (q,) of the error variance that readings of one soil at one slip and load share.
+
+    From the mean of m readings, whose error has the share c + (1 - c) / m of the variance of one,
+    with the largest m for which there are `LEAST_GROUPS`; 1 where there are none.
+
+    mean, std (n, q): Estimates of the rows of `data`.
+    """
+    share, runs = np.ones(mean.shape[1]), steady_runs(data)
+    for m in REPEATS:
+        groups = row_groups(runs, m)
+        if len(groups) < LEAST_GROUPS:
+            break
+        sizes = [_size(own, data.targets, mean, std) for own in (groups, row_groups(runs, 1))]
+        share = np.clip((m * (sizes[0] / sizes[1]) ** 2 - 1.0) / (m - 1.0), 0.0, 1.0)
+    return share
 
 
 def steady_runs(data: Dataset) -> list[Rows]:
@@ -84,12 +82,7 @@ def row_groups(runs: list[Rows], length: int) -> Rows:
     return np.asarray(groups, dtype=np.int64).reshape(-1, length)
 
 
-def _size_and_quantile(
-    groups: Rows, truth: Floats, mean: Floats, std: Floats
-) -> tuple[Floats, Floats]:
-    """Root mean square and 90 % quantile (q,) of the error of a group's mean over its mean std."""
-    if not len(groups):
-        ones = np.ones(mean.shape[1])
-        return ones, ones
-    z = np.abs(truth[groups[:, 0]] - mean[groups].mean(axis=1)) / std[groups].mean(axis=1)
-    return np.sqrt(np.mean(z**2, axis=0)), np.asarray(np.quantile(z, 0.9, axis=0))
+def _size(groups: Rows, truth: Floats, mean: Floats, std: Floats) -> Floats:
+    """Root mean square (q,) of the error of a group's mean over its mean std."""
+    z = (truth[groups[:, 0]] - mean[groups].mean(axis=1)) / std[groups].mean(axis=1)
+    return np.sqrt(np.mean(z**2, axis=0))

@@ -22,9 +22,9 @@ Functions, with NAME the name of OUT.c:
 
   NAME_single          the estimate from one row
   NAME_set_start       begin a set of rows of one soil
-  NAME_set_step        add rows to a set
-  NAME_set_answer      the estimate from all rows of the set
-  NAME_set_update      a step and its answer in one
+  NAME_set_step        add rows to a set, and estimate from all so far
+  NAME_set_answer      the estimate from all rows so far
+  NAME_set_check       the fault detector: the rows against the exact model
   NAME_tracker_start   begin a drive over soils that change
   NAME_tracker_read    one row of it: what it is, and the soil after it
 

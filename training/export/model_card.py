@@ -86,8 +86,8 @@ def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) ->
         if (carried := trained.set_posterior.response.carried) < 1.0:
             lines += [CARRIED.format(carried), ""]
         lines += [*trained.set_posterior.scales.for_card(), ""]
-    elif trained.errors is not None:
-        parts = zip(targets, trained.errors.common_share(), strict=True)
+    elif trained.errors is not None and trained.common_share is not None:
+        parts = zip(targets, trained.common_share, strict=True)
         shares = ", ".join(f"{target} {share:.0%}" for target, share in parts)
         lines += [HELD_OUT.format(rows=len(trained.errors.rows), shares=shares), ""]
     lines += ["## Made by", "", *_provenance(trained, metadata), ""]

@@ -11,7 +11,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from soilml.log_import.checks.checked_rows import Hint, RowsToCheck
-from soilml.log_import.checks.slip_checks import check_definition, check_slips, check_speeds
+from soilml.log_import.checks.slip_checks import (
+    LARGEST_RADIUS,
+    check_definition,
+    check_slips,
+    check_speeds,
+)
 
 #: Range of T / (W r) of driving wheels on soil: the largest is of light wheels on cohesive snow;
 #: and that to which a correction is likely to bring it.
@@ -104,6 +109,8 @@ def _cause_of_traction(rows: RowsToCheck, role: str, traction: float) -> str:
     ratio = channel.gear_ratio.value if channel else 1.0
     if ratio > 1.0 and TRACTION[0] < traction / ratio < TRACTION[1]:
         return f"[{role}] is at the wheel already; remove gear_ratio"
+    if rows.radius is not None and float(np.nanmedian(rows.radius)) > LARGEST_RADIUS:
+        return "the radius is in mm"
     causes = rows.units_that_give(traction, _USUAL_TRACTION, load=-1, **{role: 1})
     if role == "motor_current" and _USUAL_TRACTION[0] < traction / 1e3 < _USUAL_TRACTION[1]:
         causes = ["torque_constant is in mN m/A, or the current in mA"]

@@ -12,6 +12,7 @@ from soilml.log_import.channels.wheel_quantities import slip_ratio
 from soilml.log_import.checks.checked_rows import Hint, RowsToCheck
 from soilml.log_import.mapping.channel_map import ROTATIONS, SLIP_DEFINITIONS, TRAVELS
 
+LARGEST_RADIUS = 2.0  # A larger one, m, is rather in mm
 _OTHER_RADIUS = 0.15  # Largest slip that odometry with another radius gives
 _NO_SLIP = 1e-6  # Slip of rows whose travel and rotation are one measurement
 #: Travel over rim speed, at the lowest slip and in the middle of the rows, that a wheel may have.
@@ -58,7 +59,7 @@ def check_speeds(rows: RowsToCheck) -> Iterator[Hint]:
             f"it was measured before a gearbox of up to {excess} to 1 (write gear_ratio in "
             f"[{rotation}]), or its unit is wrong"
         )
-        cause = "the radius is in mm" if radius > 2.0 else ", or ".join(unit) or cause
+        cause = "the radius is in mm" if radius > LARGEST_RADIUS else ", or ".join(unit) or cause
         text = (
             f"slip is {1.0 - fastest:.4g} or more in all windows: the rim would be {excess} "
             f"times as fast as the travel; probably {cause}"

@@ -13,51 +13,32 @@ from soilml.onboard.multi_sensor import fuse_estimates
 pytestmark = pytest.mark.slow
 
 PRIOR = PriorSummary(np.asarray([0.3]), np.asarray([0.2]), np.asarray([-0.9]), np.asarray([1.5]))
-ROWS, REPEATS = 2000, 8
+ROWS = 2000
 
 
 class Sensors:
-    """Sensors of common and own errors: truth, mean and std of single readings and averages.
+    """Sensors whose errors have a correlation; each reading's std is drawn."""
 
-    Each reading's std is drawn; its error has the correlation `common` with the other sensor's and
-    the share `soil` of its variance in common with other readings of the same sensor.
-    """
-
-    def __init__(self, common=0.6, soil=0.9, sizes=(0.05, 0.08), seed=0):
-        self.common, self.soil, self.sizes = common, soil, sizes
+    def __init__(self, common=0.6, sizes=(0.05, 0.08), seed=0):
+        self.common, self.sizes = common, sizes
         self.rng = np.random.default_rng(seed)
 
-    def draw(self, rows, repeats=1):
-        """Truth (rows,), mean and std (sensors, repeats, rows)."""
-        rng, m = self.rng, len(self.sizes)
-        truth = rng.normal(0.3, 0.2, rows)
-        shared = rng.normal(size=(1, rows))
-        own = rng.normal(size=(m, rows))
-        part = self.common / self.soil
-        of_soil = np.sqrt(part) * shared + np.sqrt(1.0 - part) * own
-        noise = rng.normal(size=(m, repeats, rows))
-        error = np.sqrt(self.soil) * of_soil[:, None] + np.sqrt(1.0 - self.soil) * noise
-        std = np.asarray(self.sizes)[:, None, None] * rng.uniform(0.7, 1.4, (m, 1, rows))
-        std = np.repeat(std, repeats, axis=1)
+    def draw(self, rows):
+        """Truth (rows,), mean and std (sensors, rows)."""
+        shape = len(self.sizes), rows
+        truth, shared, own = (self.rng.normal(size=size) for size in (rows, (1, rows), shape))
+        error = np.sqrt(self.common) * shared + np.sqrt(1.0 - self.common) * own
+        std = np.asarray(self.sizes)[:, None] * self.rng.uniform(0.7, 1.4, shape)
+        truth = 0.3 + 0.2 * truth
         return truth, truth + std * error, std
 
     def files(self):
-        """Held-out errors of each sensor, with repeated readings."""
-        truth, mean, std = self.draw(ROWS)
-        ratio = np.sqrt(self.soil + (1.0 - self.soil) / REPEATS)
+        """Held-out errors of each sensor, of which the first is of an earlier file."""
+        truth, means, stds = self.draw(ROWS)
+        earlier = {"repeats": [1], "repeat_std": [[1.0]], "repeat_coverage_factor": [[1.645]]}
         return [
-            HeldOutErrors.of(
-                {
-                    "rows": range(ROWS),
-                    "truth": truth,
-                    "mean": mean[i, 0],
-                    "std": std[i, 0],
-                    "repeats": [1, REPEATS],
-                    "repeat_std": [[1.0], [ratio]],
-                    "repeat_coverage_factor": [[1.645], [1.645]],
-                }
-            )
-            for i in range(len(self.sizes))
+            HeldOutErrors.of({"rows": range(ROWS), "truth": truth, "mean": m, "std": s} | more)
+            for m, s, more in zip(means, stds, (earlier, {}), strict=True)
         ]
 
 
@@ -85,7 +66,7 @@ def test_fused_estimates_are_calibrated_whatever_the_correlation(common):
     files = sensors.files()
     assert joint_errors(tuple(files))[0].correlation[0, 1] == pytest.approx(common, abs=0.05)
     truth, mean, std = sensors.draw(20000)
-    each = [estimate(mean[i, 0], std[i, 0], files[i]) for i in range(2)]
+    each = [estimate(mean[i], std[i], files[i]) for i in range(2)]
     fused = fuse_estimates(each)
     assert rmse(fused.estimate, truth) < 1.002 * min(rmse(e, truth) for e in each)
     assert cover(fused.estimate, truth) == pytest.approx(0.9, abs=0.015)

@@ -33,5 +33,6 @@ def test_what_does_not_belong_together_is_refused():
         fuse_estimates(at)
     with pytest.raises(InputError, match="errors on common rows: train them from one data file"):
         fuse_estimates([one, one])
+    np.testing.assert_array_equal(fuse_estimates([one]).estimate.mean, one.mean)  # alone, as it is
     with pytest.raises(InputError, match="no estimate given"):
         fuse_estimates([])
