@@ -85,4 +85,4 @@ def row_groups(runs: list[Rows], length: int) -> Rows:
 def _size(groups: Rows, truth: Floats, mean: Floats, std: Floats) -> Floats:
     """Root mean square (q,) of the error of a group's mean over its mean std."""
     z = (truth[groups[:, 0]] - mean[groups].mean(axis=1)) / std[groups].mean(axis=1)
-    return np.sqrt(np.mean(z**2, axis=0))
+    return np.asarray(np.sqrt(np.mean(z**2, axis=0)))
