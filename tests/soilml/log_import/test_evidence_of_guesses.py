@@ -130,6 +130,23 @@ def test_odometry_of_the_wheel_is_marked_whatever_its_radius(radius, noise, tmp_
     assert "divided by 100 twice" not in said
 
 
+@pytest.mark.parametrize(
+    "name", ["vel{0[0]}", "vel_{0}", "Left velocity", "v_{0}", "wheel_speed_{0} [m/s]"]
+)
+def test_speeds_of_two_sides_are_of_rims_and_no_travel(name, tmp_path):
+    rng = np.random.default_rng(7)
+    d = drive(rng, (0.1, 0.3), [60] * 2, rate=20)
+    names = [name.replace("Left", side).format(side) for side in ("Left", "Right")]
+    log = write(tmp_path / "log.csv", {
+        "time [s]": d.t, names[0]: RADIUS * d.omega, names[1]: 1.02 * RADIUS * d.omega,
+        "torque [Nm]": d.torque, "Fz [N]": d.load}, digits=6)  # fmt: skip
+    text = init(tmp_path, [log])
+    content = tomllib.loads(text)
+    own = content.get("wheels", {}).get("left", content)["rim_speed"]
+    assert own["column"] == names[0].removesuffix(" [m/s]") and is_marked(text, ("rim_speed",))
+    assert "ground_speed" not in content and "NEEDED: no column is the travel" in text
+
+
 def test_counts_of_a_converter_ask_for_the_calibration(tmp_path):
     log, _ = log_of(tmp_path)
     log.write_text(log.read_text().replace("torque [Nm]", "torque_adc"))
