@@ -21,6 +21,7 @@ from soilml.log_import.channels.resampling import (
     unwrapped,
 )
 from soilml.log_import.channels.runs import Run
+from soilml.log_import.channels.wheel_quantities import slope_of
 from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.windows.mean_errors import mean_error
@@ -138,6 +139,8 @@ def combined(channel: ChannelMap, columns: list[Floats]) -> Floats:
 
     Cells that carry the wheel together add up, sensors of one sinkage are averaged.
     """
+    if channel.role == "slope":
+        return channel.scale * slope_of(columns)
     total = channel.scale * sum(columns[1:], start=columns[0])
     if channel.role == "slip":
         total = our_slip(total, channel.definition)

@@ -22,7 +22,7 @@ from soilml.log_import.units import dimension, factor, is_raw_signal
 from soilml.remarks import Remark
 
 #: Kinds that a channel may have beside its own, where `unit` or a calibration brings it there.
-_ALSO = {"load": {"kg"}, "drawbar_pull": {"kg"}}
+_ALSO = {"load": {"kg"}, "drawbar_pull": {"kg"}, "slope": {"m/s^2", "1"}}
 _SAME_UNIT = 1e-3  # Relative difference of two units of the same size
 #: Shared error of a torque from a current: of torque constant and efficiency, as data sheets state
 #: them; of a load from a mass, as a rover is weighed.
@@ -99,7 +99,7 @@ def _is_of_a_mass(wheel: WheelMap, run: Run) -> bool:
     known = samples[np.isfinite(samples)]
     if len(load.columns) > 1 or known.size < _FEWEST or not known[0]:
         return False
-    if np.ptp(known) == 0.0 or slope is None or not slope.columns:
+    if np.ptp(known) == 0.0 or slope is None or len(slope.columns) != 1:
         return bool(np.ptp(known) == 0.0)
     angle = run.find(slope.columns[0])[1]
     return angle.size == samples.size and _follows(samples, np.cos(slope.scale * angle))

@@ -97,7 +97,7 @@ ROLES: dict[str, tuple[str, str]] = {
     "load": ("N", "vertical load on the wheel"),
     "drawbar_pull": ("N", "pull of the wheel on its axle"),
     "sinkage": ("m", "sinkage of the wheel"),
-    "slope": ("rad", "slope of the ground, positive uphill"),
+    "slope": ("rad", "slope of the ground, positive uphill; or accelerations, or a quaternion"),
 }
 #: Channels that only a wheel-leg has: maps with the table [wheel_leg].
 LEG_ROLES: dict[str, tuple[str, str]] = {
@@ -115,7 +115,7 @@ SLIP_DEFINITIONS = ("1 - v/(r omega)", "v/(r omega)", "(r omega - v)/v")
 #: How many columns a channel may have, where more than one: x, y, z; cells that are added up;
 #: sensors of which the mean is taken.
 _SEVERAL: dict[str, Sequence[int]] = {
-    "position": (1, 2, 3), "load": range(1, 9), "drawbar_pull": range(1, 9),
+    "position": (1, 2, 3), "slope": (1, 3, 4), "load": range(1, 9), "drawbar_pull": range(1, 9),
     "sinkage": range(1, 5),
 }  # fmt: skip
 EXACT, NOTHING = Uncertain(1.0), Uncertain(0.0)
@@ -239,6 +239,8 @@ class ChannelMap:
             size = self.one.value
         elif self.counts_per_turn:
             size = 2.0 * math.pi / self.counts_per_turn
+        elif self.role == "slope" and len(self.columns) > 1:
+            size = 1.0  # an angle, whatever the unit of accelerations
         else:
             size = factor(self.unit, UNITS[self.role])
         return -size if self.reverse else size

@@ -15,6 +15,7 @@ from soilml.errors import InputError
 from soilml.io.bounds import KEPT_VALUES, LOG_BYTES, LOG_VALUES
 from soilml.io.csv_by_arrow import blocks_of_cells
 from soilml.io.spreadsheet import sheet_rows
+from soilml.log_import.readers.signals import signals_of
 from soilml.log_import.readers.text_cells import MISSING, as_numbers, time_of_day
 from soilml.log_import.readers.text_layout import TextLayout, decode_text, find_layout, split_line
 from soilml.log_import.recording import Recording
@@ -31,7 +32,7 @@ _GROUPED = re.compile(rf"(?<=\d)[{_MARKS}](?=\d{{3}}(?!\d))", re.ASCII)
 def read_delimited_text(
     path: Path, progress: Callable[[int], None] | None = None
 ) -> list[Recording]:
-    """The table of a text log.
+    """The table of a text log, or a recording for each signal of one with a line a reading.
 
     Encoding, separator, decimal mark, header, line of units and the first sample are found. Cells
     that are not a number count as missing. Lines with a wrong number of cells are left out.
@@ -42,7 +43,7 @@ def read_delimited_text(
     """
     size = path.stat().st_size
     if size >= SMALLEST and (plain := _plain_recording(path, progress)) is not None:
-        return [plain]
+        return signals_of(plain)
     LOG_BYTES.check(path, size)
     text, encoding = decode_text(path.read_bytes(), path)
     if any(mark in text for mark in _MARKS):
@@ -89,7 +90,7 @@ def _recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) ->
             columns[name] = values
         else:
             texts[name] = [cell.strip().strip('"') for cell in cells]
-    return [_recorded(path, layout, columns, texts, found, bad)]
+    return signals_of(_recorded(path, layout, columns, texts, found, bad))
 
 
 def _rows(lines: Sequence[str], layout: TextLayout) -> tuple[list[list[str]], int]:

@@ -130,11 +130,41 @@ def test_odometry_of_the_wheel_is_marked_whatever_its_radius(radius, noise, tmp_
     assert "divided by 100 twice" not in said
 
 
+@pytest.mark.parametrize(
+    "name", ["vel{0[0]}", "vel_{0}", "Left velocity", "v_{0}", "wheel_speed_{0} [m/s]"]
+)
+def test_speeds_of_two_sides_are_of_rims_and_no_travel(name, tmp_path):
+    rng = np.random.default_rng(7)
+    d = drive(rng, (0.1, 0.3), [60] * 2, rate=20)
+    names = [name.replace("Left", side).format(side) for side in ("Left", "Right")]
+    log = write(tmp_path / "log.csv", {
+        "time [s]": d.t, names[0]: RADIUS * d.omega, names[1]: 1.02 * RADIUS * d.omega,
+        "torque [Nm]": d.torque, "Fz [N]": d.load}, digits=6)  # fmt: skip
+    text = init(tmp_path, [log])
+    content = tomllib.loads(text)
+    own = content.get("wheels", {}).get("left", content)["rim_speed"]
+    assert own["column"] == names[0].removesuffix(" [m/s]") and is_marked(text, ("rim_speed",))
+    assert "ground_speed" not in content and "NEEDED: no column is the travel" in text
+
+
 def test_counts_of_a_converter_ask_for_the_calibration(tmp_path):
     log, _ = log_of(tmp_path)
     log.write_text(log.read_text().replace("torque [Nm]", "torque_adc"))
     text = init(tmp_path, [log])
     assert 'scale = "1 N m"  # CHANGE: what 1 count is' in text and "torque" not in silent(text)
+
+
+def test_a_line_for_each_reading_of_a_bus(tmp_path):
+    """Time, signal, value and unit, as exports of CAN have them."""
+    d = drive(np.random.default_rng(8), (0.1, 0.3, 0.5), [60] * 3, rate=20)
+    signals = {"WheelSpeed": ("rad/s", d.omega), "VehicleSpeed": ("km/h", 3.6 * d.v),
+               "WheelTorque": ("Nm", d.torque), "WheelLoad": ("N", d.load)}  # fmt: skip
+    lines = [f"{t:.3f},{name},{values[i]:.5f},{unit}" for i, t in enumerate(d.t)
+             for name, (unit, values) in signals.items()]  # fmt: skip
+    (tmp_path / "can.csv").write_text("\n".join(["Timestamp,Signal,Value,Unit", *lines]))
+    text = init(tmp_path, [tmp_path / "can.csv"])
+    assert silent(text) == {"wheel_speed": "WheelSpeed", "ground_speed": "VehicleSpeed",
+                            "torque": "WheelTorque", "load": "WheelLoad"}  # fmt: skip
 
 
 def test_a_load_far_from_the_stated_mass_is_marked(tmp_path):

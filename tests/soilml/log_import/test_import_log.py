@@ -24,6 +24,8 @@ PLACES = {
     "wheel_angle": {"column": "a", "unit": "deg", "gear_ratio": 50},
     "position": {"column": "x", "unit": "mm"},
 }
+SLOPE = np.radians(15.0)
+SINE, COSINE = np.sin(SLOPE), np.cos(SLOPE)
 
 
 def log_of(rng, path, **settings):
@@ -148,10 +150,20 @@ def test_the_bias_is_read_by_estimate(tmp_path, model_file):
     assert checked_sensors(imported.bias) == pytest.approx(sizes, rel=1e-3)
 
 
-def test_each_wheel_is_a_run_and_the_load_knows_the_slope(tmp_path):
+@pytest.mark.parametrize(
+    ("imu", "unit"),
+    [
+        ({"pitch": 15.0}, "deg"),
+        ({"ax": SINE, "ay": 0.0, "az": COSINE}, "g"),
+        # positive about the axis to the left is downhill
+        ({"qx": 0.0, "qy": -2 * np.sin(SLOPE / 2), "qz": 0.0, "qw": 2 * np.cos(SLOPE / 2)}, ""),
+    ],
+    ids=["angle", "accelerations", "quaternion"],
+)
+def test_each_wheel_is_a_run_and_the_load_knows_the_slope(imu, unit, tmp_path):
     """Front wheels lose h sin(alpha) / L of the weight to the rear ones."""
     d = drive(np.random.default_rng(25), slips=(0.2,))
-    columns = {"t": d.time, "v": d.ground, "pitch": np.full(d.time.size, 15.0)}
+    columns = {"t": d.time, "v": d.ground, **{k: np.full(d.time.size, x) for k, x in imu.items()}}
     for name in ("fl", "rr"):
         columns[f"w_{name}"], columns[f"T_{name}"] = d.rim / RADIUS, d.torque
     path = write_csv(tmp_path / "drive.csv", columns)
@@ -162,7 +174,7 @@ def test_each_wheel_is_a_run_and_the_load_knows_the_slope(tmp_path):
             "mass": "20 kg +- 0.1 kg", "wheels": 4, "wheelbase": 0.8, "behind_front": 0.3,
             "height": "0.25 m +- 0.02 m",
         },
-        "slope": {"column": "pitch", "unit": "deg"},
+        "slope": {"column": list(imu), "unit": unit},
         "ground_speed": {"column": "v"},
         "wheels": {
             name: {
@@ -175,9 +187,9 @@ def test_each_wheel_is_a_run_and_the_load_knows_the_slope(tmp_path):
     }  # fmt: skip
     table = import_log(path, content).table
     assert list(table["run"]) == ["drive_fl", "drive_rr"] and list(table["wheel"]) == ["fl", "rr"]
-    weight, slope = 20 * 9.80665, np.radians(15.0)
-    front = weight * (0.5 * np.cos(slope) - 0.25 * np.sin(slope)) / 0.8 / 2
-    rear = weight * np.cos(slope) / 2 - front
+    weight = 20 * 9.80665
+    front = weight * (0.5 * COSINE - 0.25 * SINE) / 0.8 / 2
+    rear = weight * COSINE / 2 - front
     np.testing.assert_allclose(table["load_N"], [front, rear], rtol=1e-6)
 
 
