@@ -96,7 +96,7 @@ class FittedReadings:
         """
         count = len(self.channels)
         names = ", ".join(map(channel_name, self.channels))
-        lines = "Lines: the fitted model."
+        lines = "Lines: the model on the estimated soil, without errors that all rows share."
         if self.before is not None:
             lines = f"Dashed: the soil alone. Solid: {with_added or 'with what was added'}."
         alt = f"{names} over slip, measured and predicted, with residuals below"
