@@ -273,11 +273,6 @@ def member(name: str) -> Statistic:
     return lambda rows: rows[0].get(name, "")
 
 
-def sets_of(rows: list[Row]) -> str:
-    """Number of rows of a group."""
-    return str(len(rows))
-
-
 def source_state() -> str:
     """A digest of all files on which records depend."""
     digest = sha256()

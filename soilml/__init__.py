@@ -6,6 +6,7 @@ Effects of the catalogue (`soilml.physics.effects`) can be imported from here to
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
 
 TYPE_CHECKING = False  # typing takes longer to import than all this; type checkers read it as true
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 __version__ = "0.3.0"
 
 
+@cache
 def _home() -> dict[str, str]:
     """The module that defines each public name, as the stub beside this file states."""
     import re

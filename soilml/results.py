@@ -196,13 +196,13 @@ class Result:
         return str(self.report()._repr_html_())
 
 
-def data_frame(columns: dict[str, Any], index: Any = None) -> Any:
+def data_frame(columns: dict[str, Any]) -> Any:
     """A pandas data frame of these columns; `MissingLibraryError` without pandas."""
     try:
         import pandas as pd
     except ImportError:
         raise MissingLibraryError("a data frame needs pandas: pip install '.[ground]'") from None
-    return pd.DataFrame(columns, index=index)
+    return pd.DataFrame(columns)
 
 
 def is_frame(rows: object) -> bool:

@@ -25,8 +25,6 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/io/table.py": {"pyarrow"},
     "soilml/experiment_design/simulator_runs.py": {"scipy"},
     "soilml/numerics/gaussian_emulator.py": {"scipy"},
-    "soilml/gap/workflow.py": {"threadpoolctl"},
-    "soilml/inference/posterior.py": {"threadpoolctl"},
     "soilml/systems/rim_stress/stress.py": {"scipy"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/presentation.py": {"matplotlib"},

@@ -172,9 +172,9 @@ def format_band(low: float, middle: float, high: float, unit: str = "1", digits:
     return format_quantity(middle, unit, ends=(low, high), digits=digits)
 
 
-def format_residual(x: float, digits: int = 3) -> str:
+def format_residual(x: float) -> str:
     """A mean squared residual; one far below that of noise is given as an upper limit."""
-    return "< 0.001" if 0.0 <= x < 1e-3 else decimal(x, digits)
+    return "< 0.001" if 0.0 <= x < 1e-3 else decimal(x, 3)
 
 
 def share_left(fraction: float) -> str:

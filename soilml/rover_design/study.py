@@ -16,7 +16,6 @@ from soilml.config.model_settings import take_soil
 from soilml.config.wheeled_rover import GravityByName, RoverWheel, WheeledRover, read_gravity
 from soilml.errors import InputError
 from soilml.io.declared_settings import Numbers, OneOf, in_si, take_declared
-from soilml.io.named_files import NO_FILES, NamedFiles
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter
@@ -159,7 +158,6 @@ class SoilQuestion:
     entries: Published soils by name, as likely as each other; empty where the file states one soil.
     soil, prior, tests: The soil of the file, priors of its parameters, tests of it.
     rows: Model file and table of runs whose posterior is the soil; None without.
-    named: What that model file may name; None for any file, beside it.
     """
 
     entries: Mapping[str, SoilEntry] = field(default_factory=dict)
@@ -167,7 +165,6 @@ class SoilQuestion:
     prior: Mapping[str, Prior] = field(default_factory=dict)
     tests: tuple[SoilTest, ...] = ()
     rows: tuple[Path, Path] | None = None
-    named: NamedFiles | None = None
 
     @property
     def files(self) -> list[str]:
@@ -211,15 +208,13 @@ class DesignStudy:
         return np.asarray(0.5 * rover.loads(slope))
 
 
-def read_study(path: str | os.PathLike[str], files: NamedFiles | None = None) -> DesignStudy:
+def read_study(path: str | os.PathLike[str]) -> DesignStudy:
     """Read a question of a design from a TOML file with [rover], [wheel], [soil] and [goal].
-
-    `files` are those that it may name, by default any, beside it.
 
     Raises `InputError`, which names file, table and key, for a figure that is missing, misspelt or
     out of bounds: nothing of a rover is assumed.
     """
-    settings = read_settings(path, files=files)
+    settings = read_settings(path)
     rover = take_declared(_RoverTable, settings.table("rover"))
     wheel = take_declared(_WheelTable, settings.table("wheel"))
     sizes = {"radius": wheel.radius, "width": wheel.width, "lug_height": wheel.lug_height}
@@ -260,8 +255,7 @@ def _take_soil(settings: Settings) -> SoilQuestion:
     if "model" in settings or "runs" in settings:
         rows = settings.file("model"), settings.file("runs")
         settings.finish()
-        named = None if settings.files.folder is not None else NO_FILES
-        return SoilQuestion(rows=rows, named=named)
+        return SoilQuestion(rows=rows)
     content = dict(settings.content)
     if "names" in content:
         names = content.pop("names")

@@ -195,7 +195,7 @@ def soil_of_rows(question: SoilQuestion) -> MeasuredSoil | None:
     if question.rows is None:
         return None
     model, runs = question.rows
-    case = read_case(model, with_bias=True, files=question.named, with_explanations=True)
+    case = read_case(model, with_bias=True, with_explanations=True)
     if case.gears:
         raise InputError(f"{model} has several gears; needed is one with [gear]")
     return measured_soil(replace(case, rover=None), read_table(runs, RUNS))

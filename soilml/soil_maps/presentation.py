@@ -22,7 +22,7 @@ SIZE = (11.0, 8.5)  # Width and height of the four panels, inches
 FILES = ("map.tif", "costmap.yaml", "costmap.pgm", "map.json", "map.png")
 
 
-def report_of_map(found: SoilMap, title: str = "Map of the soil") -> Report:
+def report_of_map(found: SoilMap) -> Report:
     """The report of a map: where the soil changes, the soil of each patch, slopes, the score."""
     drive, soils = found.drive, found.soils
     span = drive.station.max() - drive.station.min()
@@ -54,7 +54,7 @@ def report_of_map(found: SoilMap, title: str = "Map of the soil") -> Report:
             )
         ],
         remarks=list(found.remarks()),
-        title=title,
+        title="Map of the soil",
         basis=f"{len(drive.station)} rows of {wheels} wheel{'s' * (wheels > 1)}, "
         f"{len(soils.station)} stretches; {int(found.known.sum())} cells of {found.grid.cell:g} m",
     )  # fmt: skip
@@ -133,7 +133,7 @@ def map_files(
     """Content of each file of the folder of a map; `draw` makes the picture."""
     binary = {"map.tif": geotiff(found.grid, found.bands(), epsg)}
     if (occupied := found.occupied) is not None:
-        binary |= nav2_files(found.grid, found.grid.spread(occupied, found.known), "costmap")
+        binary |= nav2_files(found.grid, found.grid.spread(occupied, found.known))
     files: dict[str, Any] = {
         name: lambda path, content=content: path.write_bytes(content)
         for name, content in binary.items()

@@ -102,8 +102,8 @@ def geotiff(grid: MapGrid, bands: Mapping[str, Floats], epsg: int | None = None)
     return content.getvalue()
 
 
-def nav2_files(grid: MapGrid, occupied: Floats, name: str) -> dict[str, bytes]:
-    """NAME.yaml and NAME.pgm for nav2_map_server in its mode `raw`.
+def nav2_files(grid: MapGrid, occupied: Floats) -> dict[str, bytes]:
+    """costmap.yaml and costmap.pgm for nav2_map_server in its mode `raw`.
 
     A pixel is the occupancy itself, 0 to 100, and 255 where it is unknown (nav2_map_server, map_io:
     values above 100 are unknown).
@@ -115,8 +115,8 @@ def nav2_files(grid: MapGrid, occupied: Floats, name: str) -> dict[str, bytes]:
     pixel[known] = np.round(100.0 * np.clip(occupied[known], 0.0, 1.0)).astype(np.uint8)
     head = f"P5\n{grid.shape[1]} {grid.shape[0]}\n255\n".encode()
     yaml = (
-        f"image: {name}.pgm\nmode: raw\nresolution: {grid.cell!r}\n"
+        f"image: costmap.pgm\nmode: raw\nresolution: {grid.cell!r}\n"
         f"origin: [{grid.west!r}, {grid.south!r}, 0.0]\nnegate: 0\n"
         "occupied_thresh: 0.65\nfree_thresh: 0.25\n"
     )
-    return {f"{name}.yaml": yaml.encode(), f"{name}.pgm": head + pixel[::-1].tobytes()}
+    return {"costmap.yaml": yaml.encode(), "costmap.pgm": head + pixel[::-1].tobytes()}

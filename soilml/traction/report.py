@@ -80,7 +80,7 @@ class PullReport(Result):
         slips = format_range(*self.measured_range.slip, digits=2)
         loads = format_range(*self.measured_range.load)
         status, tone = "predicted", "good"
-        if all(vague) or any(vague):
+        if any(vague):
             status, tone = "not known" if all(vague) else "partly known", "warn"
         if not all(moves):
             status, tone = "moves under some loads" if any(moves) else "does not move", "bad"

@@ -1,6 +1,6 @@
 """Commands that are killed at random moments: outputs are whole, and a rerun makes them anew.
 
-After a kill every output is whole, old or new; after the rerun the outputs are those of an
+After a kill every output that is there is whole; after the rerun the outputs are those of an
 undisturbed run, bit for bit, and nothing else lies beside them. `make faults FAULT_KILLS=30` kills
 each command so often.
 """
@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from conftest import THREE_CHANNEL_MODEL as MODEL
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "examples" / "import"))
@@ -25,21 +26,6 @@ from rig import write_logs  # noqa: E402
 
 KILLS = int(os.environ.get("FAULT_KILLS", "0"))
 LOGS = ("sand_1.csv", "sand_2.csv", "sand_3.csv", "sand_4.csv")
-MODEL = """\
-[gear]
-type = "wheel"
-radius = 0.15
-width = 0.12
-[soil]
-name = "wong1989/dry_sand"
-[soil.prior]
-cohesion = [0.0, 3000.0]
-friction_angle = [0.3, 0.8]
-shear_modulus = [0.005, 0.04]
-[noise]
-torque_Nm = "2 %"
-drawbar_pull_N = "2 % + 0.2"
-"""
 #: What is killed: the words of each command, in a folder with its inputs; it writes below `out`.
 COMMANDS = {
     "generate": "generate wheel out/d.parquet --rows 60000 --workers 2",

@@ -41,7 +41,7 @@ ARGUMENTS = (
     "seed",
     "ignore-extra",
     ("--out FILE.csv", "write pull and slope over slip to this file", OutputFile),
-    ("--picture FILE.png", "draw them", OutputFile),
+    ("--picture FILE.png", "draw pull and slope over slip", OutputFile),
     "report",
 )
 

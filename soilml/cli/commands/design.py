@@ -57,7 +57,7 @@ ARGUMENTS = (
     ("--designs N (250)", "designs of the first round", whole_number_from(1, 100_000)),
     ("--draws N (1000)", "draws of soil and model error", whole_number_from(50, 20_000)),
     ("--out FILE.json", "write the result to this file", OutputFile),
-    ("--picture FILE.png", "draw designs, front and shares", OutputFile),
+    ("--picture FILE.png", "draw probability, margin and front of the designs", OutputFile),
     "report",
 )
 

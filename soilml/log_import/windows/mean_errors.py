@@ -145,8 +145,7 @@ def travel_ratio(
     blurred by noise of the places. Its rates from part to part of the window have a long-run
     variance S, in which the noise of the places cancels: what it adds to one part it takes from
     the next. The slope of a line over the time t has the variance :math:`6 S / (5 t)`, to which
-    that of the noise is added. For two speeds the
-    error is that of the mean of the rates.
+    that of the noise is added. For two speeds the error is that of the mean of the rates.
     """
     both = np.isfinite(rim) & np.isfinite(ground)
     if both.sum() < 8:

@@ -118,8 +118,6 @@ class Effect:
     #: whether with it, as without it, the load that the soil carries rises with the sinkage of a
     #: driving gear; a search for equilibrium then needs no scan
     load_rises: ClassVar[bool] = False
-    #: whether it multiplies the points of a contact, so that rows without it are solved apart
-    more_points: ClassVar[bool] = False
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)

@@ -158,7 +158,6 @@ class FlatRim(SlipLoadScaling):
 
     law_terms: ClassVar[tuple[str, ...]] = ("by_load",)
     load_rises: ClassVar[bool] = True
-    more_points: ClassVar[bool] = True
     gear_types: ClassVar[tuple[type, ...]] = (Wheel,)
     compliance: Annotated[Real, Parameter("m/N", 0.0, 1e-2, "C, deflection per load")] = 0.0
 

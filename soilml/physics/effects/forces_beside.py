@@ -300,7 +300,6 @@ class Camber(Effect):
     """
 
     load_rises: ClassVar[bool] = True
-    more_points: ClassVar[bool] = True
     gear_types: ClassVar[tuple[type, ...]] = (Wheel,)
     angle: Annotated[Real, Parameter("rad", 0.0, 0.5, "gamma, of the wheel's plane")] = 0.0
 

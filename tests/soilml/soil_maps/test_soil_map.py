@@ -182,7 +182,7 @@ def test_a_geotiff_lies_where_its_cells_are(tmp_path):
 
 def test_nav2_reads_the_probability_of_not_climbing():
     grid = MapGrid(-1.5, 2.0, 0.5, (2, 3))
-    files = nav2_files(grid, np.asarray([[0.0, 0.304, 1.0], [np.nan, 0.5, 0.996]]), "costmap")
+    files = nav2_files(grid, np.asarray([[0.0, 0.304, 1.0], [np.nan, 0.5, 0.996]]))
     head, body = files["costmap.pgm"][:11], files["costmap.pgm"][11:]
     assert head == b"P5\n3 2\n255\n"
     assert list(body) == [255, 50, 100, 0, 30, 100]  # north first; above 100 is unknown
