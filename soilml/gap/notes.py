@@ -146,8 +146,8 @@ def like_another_soil(posterior: Posterior, soil: Solution) -> list[Remark]:
             alike.append(s.name)
     if not alike:
         return []
-    text = f"that {', '.join(alike)} are absent: at usual size, these runs cannot tell them from "
-    return [Remark("like-another-soil", f"{text}another soil", tuple(alike))]
+    text = f"that there is no {' or '.join(alike)}: at usual size, another soil would look the same"
+    return [Remark("like-another-soil", text, tuple(alike))]
 
 
 def like_another_force(posterior: Posterior, names: Sequence[str]) -> list[Remark]:

@@ -69,7 +69,7 @@ def _shrinks(report: GapReport) -> str:
 
 
 def _size(report: GapReport) -> str:
-    """How large an unknown gap is; one of few sigma is no matter of its size."""
+    """How large an unknown gap is, or that residuals as small as the noise form a pattern."""
     before = report.gap["train"].before
     if before < LIKE_NOISE:
         return "residuals form a pattern that noise does not"
@@ -128,7 +128,7 @@ def listed_explanations(report: GapReport) -> str:
     said, status = "", report.status
     if status == "class":
         sets = [" + ".join(names) for names in report.cause_set]
-        if left := len(sets) - LISTED if len(sets) > LISTED else 0:
+        if (left := len(sets) - LISTED) > 0:
             sets[LISTED:] = [f"{left} other{'s' if left > 1 else ''}"]
         said = f"These runs cannot distinguish, the likeliest first: {', or '.join(sets)}."
     elif status == "suspected":

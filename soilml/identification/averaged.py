@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,7 +30,6 @@ from soilml.inference.posterior import Posterior, infer
 from soilml.inference.problem import InferenceProblem
 from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.physics.effects import EFFECTS
-from soilml.physics.effects.base import Effect
 from soilml.remarks import Remark
 
 
@@ -76,10 +75,7 @@ def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
 
 
 def averaged_samples(
-    case: Case,
-    readings: Readings,
-    free: Sequence[Coordinate],
-    effects: Mapping[str, type[Effect]] = EFFECTS,
+    case: Case, readings: Readings, free: Sequence[Coordinate]
 ) -> PosteriorSamples:
     """Weighted samples of the soil over all explanations of the rows; see `averaged`."""
     optimum = fit_under_declared_noise(case, readings, free)
@@ -88,7 +84,7 @@ def averaged_samples(
         std = np.where(np.isfinite(readings.std), readings.std, optimum.problem.readings.std)
         known = readings.from_case & np.isfinite(readings.std)
         readings = replace(readings, std=std, from_case=known)
-    problem = InferenceProblem.of(case, readings, free, candidate_effects(case, effects))
+    problem = InferenceProblem.of(case, readings, free, candidate_effects(case, EFFECTS))
     try:
         found = infer(problem)
     except InputError:
@@ -112,8 +108,7 @@ def soil_samples(
     """Samples of the soil over all explanations of the rows, as `averaged` takes them.
 
     With `exact_model`, and where the case states the error of its model, those of the exact
-    posterior. Raises `FitError` as `averaged`, and where
-    noise is not declared.
+    posterior. Raises `FitError` as `averaged`, and where noise is not declared.
     """
     check_declared(readings)
     if exact_model or case.states_model_error:

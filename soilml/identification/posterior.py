@@ -49,14 +49,13 @@ class PosteriorSamples:
     #: Squared residuals of the best fit in variances of the declared noise, per degree of freedom
     misfit: float
     rejected: bool  # Whether the rows reject the model with all errors that the method knows
-    noise_scale: float = (
-        1.0  # Factor on the declared noise: above 1 where the rows reject the model
-    )
+    #: Factor on the declared noise: above 1 where the rows reject the model
+    noise_scale: float = 1.0
     explanations: tuple[SoilExplanation, ...] = ()  # That they average over, the likeliest first
 
-    def equally_weighted(self, count: int, seed: int = 0) -> Integers:
+    def equally_weighted(self, count: int) -> Integers:
         """Rows (count,) of the samples, as often as their weights say."""
-        offset = np.random.default_rng(seed).random()
+        offset = np.random.default_rng(0).random()
         return systematic_resampling(self.sample.weights, count, offset)
 
 

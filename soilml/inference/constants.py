@@ -1,7 +1,7 @@
 """Every number that decides in the inference, with its reason.
 
 Where a sample set a number, it is of `datagen.blind_sets`, seed 1, one plan in twenty: the sets
-that `python bench/gap.py --seed 1 --every 20` draws.
+that `python bench/run.py gap --seeds 1 --every 20` draws.
 """
 
 from __future__ import annotations

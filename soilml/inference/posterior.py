@@ -277,13 +277,13 @@ class Posterior:
         """The likeliest fitted hypothesis of exactly these effects."""
         return next((n for n in self.nodes if n.hypothesis.effects == effects), None)
 
-    def components(self, least: float = constants.LEAST_DRAWN) -> list[Component]:
+    def components(self) -> list[Component]:
         """Hypotheses, each with and without a discrepancy, and their probabilities; sum one."""
         found = []
         for node, weight in zip(self.nodes, self._weights[1], strict=False):
             share = node.share_without
             for evidence, part in ((node.without, share), (node.beside, 1.0 - share)):
-                if weight * part > least:
+                if weight * part > constants.LEAST_DRAWN:
                     found.append(Component(node, evidence.at, float(weight * part)))
         total = sum(c.weight for c in found)
         return [replace(c, weight=c.weight / total) for c in found]

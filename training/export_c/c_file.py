@@ -12,9 +12,7 @@ import numpy as np
 
 from soilml import __version__
 from soilml.onboard.metadata import read_fields
-from soilml.onboard.set_contract import (
-    SET_SWITCH,
-)
+from soilml.onboard.set_contract import SET_SWITCH
 from soilml.onboard.tracking.soil_tracker import DEFAULT_LENGTH
 from soilml.quantities import Z_90
 from training.export_c.c_text import array, number

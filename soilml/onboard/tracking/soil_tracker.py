@@ -327,11 +327,10 @@ class SoilTracker:
         rows = np.cumsum([block.rows for block in window.blocks])
         return int(np.searchsorted(rows, 0.5 * rows[-1]))
 
-    def _excess(self, misfit: float, readings: float, unknowns: int | None = None) -> float:
+    def _excess(self, misfit: float, readings: float) -> float:
         """Variance of residuals over that of the stated noise, 1 or more: of a fit, or of rows."""
-        unknowns = len(self.estimator.names) if unknowns is None else unknowns
         usual = usual_excess(self._filter.increases)
-        return max(excess_noise(misfit, readings, unknowns), usual)
+        return max(excess_noise(misfit, readings, len(self.estimator.names)), usual)
 
     def _answer(self, event: Event, words: str) -> TrackerState:
         estimate, state = self._estimate(), self._filter

@@ -75,7 +75,7 @@ def soil_catalogue() -> dict[str, SoilEntry]:
         assumed_by_all = content.get("assumed", {})
         for key, entry in content["soil"].items():
             name = f"{file.name.removesuffix('.toml')}/{key}"
-            if isinstance(entry, list):  # a row of a printed table
+            if isinstance(entry, list):  # a row of a printed table; the last cells may be left out
                 entry = dict(zip(content["columns"], entry, strict=False))
             entries[name] = _entry(name, content["source"], assumed_by_all, entry)
     return entries

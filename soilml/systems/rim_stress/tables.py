@@ -70,19 +70,18 @@ def read_steady_runs(path: str) -> dict[str, SteadyRun]:
     return runs
 
 
-def read_stresses(
-    path: str,
-    noise: Callable[[Floats], Floats] = noise_by_scatter,
-    discs: SensingWheel | None = None,
-) -> dict[str, MeasuredStress]:
+def read_stresses(path: str, discs: SensingWheel | None = None) -> dict[str, MeasuredStress]:
     """The stress of each run of one wheel from its rows, in any order.
 
-    Its standard deviation is the column `normal_Pa_std`, else what `noise` gives. Of round sensors
+    Its standard deviation is the column `normal_Pa_std`, else that of the scatter. Of round sensors
     (`discs`), points below twice the deadband may have samples that read nothing. Raises
     `TableError` for a run whose rows are no profile.
     """
     table = read_table(path, STRESS, filled=STRESS)
-    return {name: _stress(rows, noise, f", run {name}", discs) for name, rows in table.groups()}
+    return {
+        name: _stress(rows, noise_by_scatter, f", run {name}", discs)
+        for name, rows in table.groups()
+    }
 
 
 def read_readings(path: str, wheel: SensingWheel) -> dict[str, MeasuredStress]:

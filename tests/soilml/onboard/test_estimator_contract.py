@@ -88,7 +88,7 @@ def test_single_readings_and_pooled_ones_have_their_reasons(whole, pooling):
     assert pooling.run(**many(20, torque=[90.0] * 11)).reason == Reason.OUT_OF_RANGE
 
 
-def test_stacked_and_fused_estimates_keep_the_reasons(whole):
+def test_stacked_estimates_keep_the_reasons(whole):
     one, two = whole.run(**ROWS), whole.run(**many(20, load=[2000.0] * 11))
     both = Estimate.stack([one, two], (2,))
     assert both.reason.tolist() == [0, 1] and both.rows_set_aside.tolist() == [0, 11]
