@@ -34,7 +34,6 @@ from soilml.config.simulator import (
 from soilml.config.wheeled_rover import DriveErrors, WheeledRover, take_rover
 from soilml.errors import InputError
 from soilml.io.declared_settings import take_declared
-from soilml.io.named_files import NamedFiles
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
@@ -203,7 +202,7 @@ def read_case(
     effects: Mapping[str, type[Effect]] = EFFECTS,
     with_bias: bool = False,
     with_simulator: bool = True,
-    files: NamedFiles | None = None,
+    names_files: bool = True,
     with_explanations: bool = False,
 ) -> Case:
     """Read a case from a TOML model file.
@@ -221,9 +220,8 @@ def read_case(
     with_simulator
         Whether the runs of [simulator] take the place of the equations; otherwise they are not
         read.
-    files
-        Files that the model file may name; by default any, beside it. `NO_FILES` is for a text that
-        others wrote.
+    names_files
+        Whether the model file may name others, which lie beside it; not a text that others wrote.
     with_explanations
         Whether several tables [[explanation]] are read; otherwise they are refused, since the
         caller needs one model.
@@ -260,7 +258,7 @@ def read_case(
     >>> print(case.model.gear.name, case.prior["friction_angle"], case.noise["torque_Nm"].share)
     wheel Prior(lower=0.4, upper=0.8, log=False) 0.02
     """
-    settings = read_settings(path, f"soilml init {path}", files)
+    settings = read_settings(path, f"soilml init {path}", names_files)
     case = take_case(settings, effects, with_simulator)
     if with_bias:
         case = replace(case, bias=take_bias(settings.table("bias")))

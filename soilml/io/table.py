@@ -153,16 +153,6 @@ class Table:
         """The columns as a data frame of pandas; `MissingLibraryError` without it."""
         return data_frame(self.columns)
 
-    @staticmethod
-    def from_frame(frame: Any) -> Table:
-        """The rows of a data frame of pandas, polars or pyarrow, checked as files are.
-
-        Raises `TableError` as `read_table` does.
-        """
-        from soilml.io.read_table import as_table
-
-        return as_table(frame)
-
     def to_arrow(self) -> Any:
         """The columns as a pyarrow table, which pandas, polars and others take.
 

@@ -12,7 +12,6 @@ from typing import Any, NoReturn
 from soilml.errors import InputError
 from soilml.io.atomic_files import refuse_device
 from soilml.io.bounds import SETTINGS
-from soilml.io.named_files import NO_FILES, NamedFiles
 from soilml.optional_imports import tomllib
 
 #: Tables and lists in one another that a settings file may have; none needs more than six.
@@ -26,15 +25,17 @@ _LONG_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{MOST_DEP
 class Settings:
     """One table of a TOML file; each key is taken once, and `finish` rejects the others.
 
-    `files` are those that it may name; none, unless its user gave the file.
+    `folder` is that of a file that its user gave on the command line: it may name any file, and one
+    without a folder is beside it. A text of other origin, such as a page, an upload or the metadata
+    of a file, has None and may name none.
     """
 
-    def __init__(self, content: dict[str, Any], where: str, files: NamedFiles = NO_FILES) -> None:
+    def __init__(self, content: dict[str, Any], where: str, folder: Path | None = None) -> None:
         self.content = content
         self._remaining = dict(content)
         self._all = tuple(content)
         self.where = where
-        self.files = files
+        self.folder = folder
         self._known: list[str] = []
 
     def __contains__(self, key: str) -> bool:
@@ -72,18 +73,21 @@ class Settings:
         return str(self.take(key, str, "a text in quotes", default))
 
     def file(self, key: str) -> Path:
-        """The path of a file; raises `InputError` for one that these settings may not name."""
-        try:
-            return self.files.path(self.text(key))
-        except InputError as error:
-            self.fail(f"{key} {error}")
+        """The path of a file, which may not exist; `InputError` where these may name none."""
+        name = self.text(key)
+        if self.folder is None:
+            self.fail(
+                f"{key} is {name!r}; a text from the page, from an upload or from metadata may "
+                "name no file: use the command line for it"
+            )
+        return self.folder / name
 
     def table(self, key: str) -> Settings:
         """The table [key]; an empty one where there is none."""
         content = self.take(key, dict, f"a table [{key}]", {})
         nested = self.where.endswith("]") and not self.where.endswith("]]")
         where = f"{self.where[:-1]}.{key}]" if nested else f"{self.where} [{key}]"
-        return Settings(content, where, self.files)
+        return Settings(content, where, self.folder)
 
     def tables(self, key: str) -> list[Settings]:
         """The tables [[key]], in order."""
@@ -91,7 +95,7 @@ class Settings:
         if not all(isinstance(entry, dict) for entry in content):
             self.fail(f"{key} must be written as tables: [[{key}]]")
         return [
-            Settings(entry, f"{self.where} [[{key}]] number {i}", self.files)
+            Settings(entry, f"{self.where} [[{key}]] number {i}", self.folder)
             for i, entry in enumerate(content, 1)
         ]
 
@@ -113,12 +117,12 @@ class Settings:
 
 
 def read_settings(
-    path: str | os.PathLike[str], write: str = "", files: NamedFiles | None = None
+    path: str | os.PathLike[str], write: str = "", names_files: bool = True
 ) -> Settings:
     """The TOML file at `path`; raises `InputError` where it is missing or not valid TOML.
 
-    `write` is the command that writes a first one, for the message; `files` are those that the file
-    may name, by default any, beside it.
+    `write` is the command that writes a first one, for the message; `names_files`, whether it may
+    name others.
     """
     file = Path(path)
     try:
@@ -147,7 +151,7 @@ def read_settings(
         raise InputError(f"{file} is not valid TOML: a number has thousands of digits") from None
     except RecursionError:
         raise InputError(f"{file} is not valid TOML: tables or lists are nested too deep") from None
-    return Settings(content, str(file), files or NamedFiles(file.parent))
+    return Settings(content, str(file), file.parent if names_files else None)
 
 
 def _check_values(content: Any, where: str, depth: int = 0) -> None:

@@ -268,7 +268,7 @@ def _take_soil(settings: Settings) -> SoilQuestion:
     except InputError as error:
         settings.fail(str(error))
     one = content | ({"name": names[0]} if names else {})
-    own, prior, tests = take_soil(Settings(one, settings.where, settings.files))
+    own, prior, tests = take_soil(Settings(one, settings.where, settings.folder))
     if not names:
         return SoilQuestion({}, own, prior, tests)
     stated = content.keys() - {"name", "prior", "test"}

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from soilml.config.case import Case, read_case
 from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
-from soilml.io.named_files import NO_FILES
 from soilml.parameters import Parameter, declared
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.physics.forces import apply_input_effects
@@ -249,7 +248,7 @@ def case_of_text(text: str) -> Case:
         path = Path(folder) / MODEL_FILE
         path.write_text(text, encoding="utf-8")
         try:
-            return read_case(path, with_bias=True, files=NO_FILES, with_explanations=True)
+            return read_case(path, with_bias=True, names_files=False, with_explanations=True)
         except InputError as error:
             raise InputError(str(error).replace(str(path), MODEL_FILE)) from None
 

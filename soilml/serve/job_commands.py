@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from soilml.errors import InputError
-from soilml.io.named_files import NO_FILES
 
 #: Folders of a job: of the files that it reads, in which it works, and of what it writes. No
 #: written file can replace a read one, and a dropped file may have any name.
@@ -85,7 +84,7 @@ def _model_and_rows(request: Mapping[str, Any]) -> list[str]:
     from soilml.config.case import read_case
 
     model = _text_file(MODEL_FILE, request.get("model"))
-    read_case(model, with_bias=True, files=NO_FILES, with_explanations=True)
+    read_case(model, with_bias=True, names_files=False, with_explanations=True)
     run = request.get("run")
     return [MODEL_FILE, request["names"][0], *([f"--where=run={run}"] if run else [])]
 

@@ -132,7 +132,7 @@ def test_frames_of_pandas_in_and_out(folder, results):
         assert len(result.to_frame()) == len(next(iter(result.frame_columns().values())))
     soil = results["identify"].to_frame()
     assert soil.loc["friction_angle", "unit"] == "rad" and soil.index.name == "parameter"
-    table = Table.from_frame(frame)
+    table = read_table(frame)
     assert pd.DataFrame(table)["torque_Nm"].tolist() == frame["torque_Nm"].tolist()
     pd.testing.assert_frame_equal(pd.DataFrame(table), table.to_frame(), check_dtype=False)
 

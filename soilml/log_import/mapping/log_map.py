@@ -241,7 +241,7 @@ def _take_map(settings: Settings) -> LogMap:
         if name:
             table = named.table(name)
             content = _with_shared_keys(table.content, defaults)
-            own = Settings(content, table.where, settings.files)
+            own = Settings(content, table.where, settings.folder)
             channels = shared | _take_channels(own, leg is not None)
             keys = take_declared(WheelKeys, own, "wheel")
         gear, pattern = keys.gear or common.gear, keys.gear_from or common.gear_from
