@@ -11,7 +11,7 @@ from rig import write_logs
 
 from soilml.cli import main
 from soilml.log_import import import_log
-from soilml.log_import.import_report import draw_over_slip, draw_run, panels_over_slip, run_panels
+from soilml.log_import.import_report import draw_run, rows_over_slip, run_panels
 from soilml.report.figure_style import report_style
 
 FOLDER = Path("demo/import")
@@ -35,9 +35,7 @@ def picture(logs: list[str], chart: Path, target: Path) -> None:
         first, second, third = figure.subfigures(1, 3)
         for canvas, series in zip((first, second), imported.series[::3], strict=False):
             draw_run(series, imported.table, canvas.subplots(len(run_panels(series)), 1))
-        shown = panels_over_slip(imported.table, imported.radius)
-        for axes, title in zip(third.subplots(2, 1, sharex=True), shown, strict=False):
-            draw_over_slip(axes, imported.table, title, *shown[title])
+        rows_over_slip(imported.table).draw(third.subplots(2, 1, sharex=True))
         first.axes[-1].set_xlabel("time, s; sand_1")
         second.axes[-1].set_xlabel("time, s; sand_4: somebody pulls on the carriage at the end")
         figure.savefig(target, dpi=80, facecolor="white")

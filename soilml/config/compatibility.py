@@ -7,7 +7,7 @@ then that of the case, which comes from the user's model file or from `owner`.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -127,24 +127,23 @@ def gear_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[st
     if type(case.model.gear) is not type(other.model.gear):
         yield f"gear type {others!r}, {owner} has {own!r}"
         return
-    yield from _fixed_differences(case, other, owner, _is_of_gear, SIZE_TOLERANCE)
+    yield from value_differences(case, other, ("gear",), owner)
 
 
-def value_differences(case: Case, other: Case) -> Iterator[str]:
-    """Differences of the fixed values of soil and effects; what `other` varies has no value."""
-    yield from (*soil_value_differences(case, other), *effect_value_differences(case, other))
+def value_differences(
+    case: Case, other: Case, kinds: Sequence[str] = ("soil", "effects"), owner: str = OWNER
+) -> Iterator[str]:
+    """Differences of the fixed values of `kinds`: gear, soil, effects.
 
-
-def soil_value_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[str]:
-    """Differences of the fixed values of the soil."""
-    yield from _fixed_differences(case, other, owner, lambda path: "." not in path, VALUE_TOLERANCE)
-
-
-def effect_value_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[str]:
-    """Differences of the fixed values of effects, whose paths are such as slip-sinkage.n1."""
-    yield from _fixed_differences(
-        case, other, owner, lambda path: "." in path and not _is_of_gear(path), VALUE_TOLERANCE
-    )
+    What `other` varies has no value.
+    """
+    values = other.parameters()
+    for path, (_, value) in case.parameters().items():
+        kind = "soil" if "." not in path else "gear" if path.startswith("gear.") else "effects"
+        tolerance = SIZE_TOLERANCE if kind == "gear" else VALUE_TOLERANCE
+        fixed = kind in kinds and path in values and path not in other.prior
+        if fixed and not _is_close(value, values[path][1], tolerance):
+            yield f"{path} {values[path][1]:g}, {owner} has {value:g}"
 
 
 def effect_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[str]:
@@ -170,20 +169,6 @@ def prior_differences(
             and _is_close(own.upper, others.upper, VALUE_TOLERANCE)
         ):
             yield f"prior {others.as_setting()} of {name}, {owner} has {own.as_setting()}"
-
-
-def _is_of_gear(path: str) -> bool:
-    return path.startswith("gear.")
-
-
-def _fixed_differences(
-    case: Case, other: Case, owner: str, compared: Callable[[str], bool], tolerance: float
-) -> Iterator[str]:
-    values = other.parameters()
-    for path, (_, value) in case.parameters().items():
-        fixed = path in values and path not in other.prior
-        if compared(path) and fixed and not _is_close(value, values[path][1], tolerance):
-            yield f"{path} {values[path][1]:g}, {owner} has {value:g}"
 
 
 def _is_close(a: float, b: float, tolerance: float) -> bool:

@@ -10,12 +10,14 @@ import math
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.io.declared_settings import take_declared
 from soilml.io.toml_settings import Settings
+from soilml.parameters import Parameter
 from soilml.quantities import CHANNELS, column
 
 #: Largest share of a reading, and largest constant part, in the unit of any column.
@@ -155,6 +157,7 @@ def common_errors(bias: Mapping[str, Noise]) -> dict[str, float]:
 #: terramechanics model keep their sign over about a third of the slips from 0 to 1, and over loads
 #: within a factor of two.
 SLIP_LENGTH, LOG_LOAD_LENGTH = 0.3, 0.6
+_LENGTH = Parameter("1", 1e-6, 1e6, "correlation length")
 
 
 LEARNED = "learned"  # Key of a discrepancy that `gap` found
@@ -174,9 +177,9 @@ class Discrepancy:
     constant: float = 0.0  # Absolute part of the amplitude a, in the unit of the column
     # Relative part of the amplitude, as a fraction of the range of the channel's readings
     share: float = 0.0
-    slip_length: float = SLIP_LENGTH  # Correlation length l_s in slip
-    # Correlation length l_W in the natural logarithm of the load
-    log_load_length: float = LOG_LOAD_LENGTH
+    # Correlation lengths: l_s in slip, and l_W in the natural logarithm of the load
+    slip_length: Annotated[float, _LENGTH] = SLIP_LENGTH
+    log_load_length: Annotated[float, _LENGTH] = LOG_LOAD_LENGTH
     learned: bool = False  # `gap` found it beside a fit; a further analysis finds it anew
 
     def amplitude(self, span: float) -> float:
@@ -214,12 +217,7 @@ def take_discrepancy(settings: Settings) -> dict[str, Discrepancy]:
     )
     settings.permit(keys)
     parts = {k: form.take(settings, k) for k in keys if k in settings}
-    common = Discrepancy(
-        slip_length=_take_length(settings, "slip_length", SLIP_LENGTH),
-        log_load_length=_take_length(settings, "log_load_length", LOG_LOAD_LENGTH),
-        learned=settings.take(LEARNED, bool, "true or false", False),
-    )
-    settings.finish()
+    common = take_declared(Discrepancy, settings, constant=0.0, share=0.0)
     if settings.content and not parts:
         settings.fail(f"no channel has a discrepancy; give torque_Nm = '2 %', or {keys[1]}, ...")
     return {k: replace(common, share=n.share, constant=n.constant) for k, n in parts.items()}
@@ -241,10 +239,3 @@ def discrepancy_as_settings(discrepancy: dict[str, Discrepancy]) -> dict[str, An
     if any(one.learned for one in discrepancy.values()):
         settings[LEARNED] = True
     return settings
-
-
-def _take_length(settings: Settings, key: str, default: float) -> float:
-    length = settings.number(key, default)
-    if not (math.isfinite(length) and length > 0.0):
-        settings.fail(f"{key} is {length:g}; a correlation length must be above zero")
-    return length

@@ -20,6 +20,7 @@ from soilml.io.declared_settings import Default, Numbers, OneOf, settings_of, ta
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
 from soilml.numerics.smooth_process import SmoothFunctions, process_columns, squared_exponential
+from soilml.parameters import Parameter
 from soilml.physics.contact import Force
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
@@ -59,8 +60,9 @@ class _Rows:
         return found if self.depth > 1 else found[0]
 
 
-_LENGTHS = ("slip_length", "log_load_length")
+_SIZE = Parameter("1", 1e-300, 1e300, "above zero")
 _RANGE = Numbers("[smallest, largest]", 2, ordered=True)
+_LOADS = Numbers("[smallest, largest], above zero", 2, 1e-300, ordered=True)
 _CHANNEL = OneOf(tuple(map(column, CHANNELS)))
 
 
@@ -92,12 +94,14 @@ class RemainderPart:
 
     column: Annotated[str, _CHANNEL]
     gear: Annotated[str, Default("")]  # "" where the model has one gear
-    amplitude: float  # Standard deviation a of the process, in the column's unit
-    usual: float  # That of a model's usual error
-    slip_length: float  # Correlation lengths in slip and in the natural logarithm of the load
-    log_load_length: float
+    # Standard deviation a of the process, in the column's unit, and that of a model's usual error
+    amplitude: Annotated[float, _SIZE]
+    usual: Annotated[float, _SIZE]
+    # Correlation lengths in slip and in the natural logarithm of the load
+    slip_length: Annotated[float, _SIZE]
+    log_load_length: Annotated[float, _SIZE]
     slip: Annotated[tuple[float, float], _RANGE]  # Range of the analysis
-    load: Annotated[tuple[float, float], _RANGE]  # N
+    load: Annotated[tuple[float, float], _LOADS]  # N
     points: Annotated[tuple[tuple[float, ...], ...], _Rows(2)]  # Slip and load (N), (k, 2)
     mean: Annotated[tuple[float, ...], _Rows(1)]  # Of the weights, (k,)
     # F, (k, r): what the readings told of the weights, given soil and effects
@@ -312,10 +316,6 @@ def _take_part(settings: Settings, gears: Sequence[str]) -> RemainderPart:
     if part.gear not in (gears or ("",)):
         of = f"there are: {', '.join(gears)}" if gears else "this file has one, without a name"
         settings.fail(f"gear is {part.gear!r}; {of}")
-    sizes = {key: getattr(part, key) for key in ("amplitude", "usual", *_LENGTHS)}
-    for key, value in (*sizes.items(), ("load", part.load[0])):
-        if not (math.isfinite(value) and value > 0.0):
-            settings.fail(f"{key} is {value:g}; needed is a finite number above zero")
     count = len(part.points)
     if not 1 <= count <= MOST_POINTS or any(len(p) != 2 or p[1] <= 0.0 for p in part.points):
         settings.fail(f"points must be 1 to {MOST_POINTS} pairs [slip, load_N]")

@@ -14,11 +14,10 @@ from soilml.config.case import Case
 from soilml.config.compatibility import (
     check_wheel_columns,
     effect_differences,
-    effect_value_differences,
     gear_differences,
     prior_differences,
     recipe_case,
-    soil_value_differences,
+    value_differences,
 )
 from soilml.config.measurement_noise import common_errors
 from soilml.errors import InputError, TableError
@@ -230,7 +229,7 @@ def _compare(estimator: Estimator, case: Case, name: str, together: bool) -> lis
     wrong = [
         *gear_differences(case, own, name),
         *effect_differences(case, own, name),
-        *effect_value_differences(case, own, name),
+        *value_differences(case, own, ("effects",), name),
     ]
     if wrong:
         raise InputError(
@@ -239,7 +238,7 @@ def _compare(estimator: Estimator, case: Case, name: str, together: bool) -> lis
         )
     used = narrower_priors(estimator, case) if together else {}
     different = chain(
-        soil_value_differences(case, own, name),
+        value_differences(case, own, ("soil",), name),
         prior_differences(case, own, [n for n in estimator.names if n not in used], name),
         () if together else _noise_differences(case, own, name),
     )

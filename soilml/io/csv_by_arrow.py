@@ -86,7 +86,8 @@ def read_good_csv(
                 rows += len(batch)
                 _need(rows <= ROWS.most)
                 own = {name: _column(file, name, batch[name]) for name in kept}
-                _need(not all_blank(own.values(), len(batch)).any())
+                blank = [v == "" if v.dtype.kind == "U" else np.isnan(v) for v in own.values()]
+                _need(not np.all(blank, axis=0).any())
                 for name, values in own.items():
                     found[name].append(values)
         for name in set(TEXT) & found.keys():
@@ -95,14 +96,6 @@ def read_good_csv(
     except (ImportError, ValueError, TableError):  # pyarrow's own errors are kinds of `ValueError`
         return None
     return joined, np.arange(2, rows + 2)
-
-
-def all_blank(columns: Collection[Column], count: int) -> NDArray[np.bool_]:
-    """Rows (count,) in which every column is blank."""
-    blank = np.ones(count, dtype=bool)
-    for values in columns:
-        blank &= values == "" if values.dtype.kind == "U" else np.isnan(values)
-    return blank
 
 
 def _need(holds: bool) -> None:

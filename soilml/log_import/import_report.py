@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from soilml.arrays import Floats
 from soilml.fitting.levels import load_levels
 from soilml.io.table import Table
-from soilml.log_import.rows import WheelSeries
+from soilml.log_import.wheel_rows import WheelSeries
 from soilml.quantities import Z_90
 from soilml.remarks import Remark
-from soilml.report.figure_style import AFTER, BEFORE, LOADS, PRIOR, take_axes
+from soilml.report.column_figure import column_picture
+from soilml.report.figure_style import AFTER, BEFORE, PRIOR
 from soilml.report.numbers import format_quantity
 from soilml.report.report import Picture, Report
 from soilml.report.tables import Column, ReportTable
@@ -122,17 +123,7 @@ def _constant(name: str) -> str:
 
 
 def _pictures(found: ImportedLog) -> Iterator[Picture]:
-    count = len(panels_over_slip(found.table, found.radius))
-    yield Picture(
-        "The rows over slip",
-        partial(plot_rows, found.table, found.radius),
-        1,
-        count,
-        (5.0 * count, 3.6),
-        f"{len(found.table)} rows over slip",
-        "Bars are 90 % intervals of each row, from its scatter. Errors that all rows share come in "
-        "addition.",
-    )
+    yield rows_over_slip(found.table)
     for series in found.series[:MOST_RUNS]:
         panels = len(run_panels(series))
         notes = "; ".join(note.text for note in series.notes)
@@ -154,49 +145,16 @@ def _kept_share(found: ImportedLog) -> str:
     return format_quantity(kept / total if total else 0.0, "share", digits=2)
 
 
-def plot_rows(table: Table, radius: float, ax: Any = None) -> NDArray[Any]:
-    """Draw the rows over slip, a panel for each channel that was measured; see `take_axes`."""
-    shown = panels_over_slip(table, radius)
-    panels = take_axes(ax, 1, len(shown), (5.0 * len(shown), 3.6))[0]
-    for axes, (title, panel) in zip(panels, shown.items(), strict=True):
-        draw_over_slip(axes, table, title, *panel)
-    return np.asarray(panels)
-
-
-def panels_over_slip(table: Table, radius: float) -> dict[str, tuple[str, Floats]]:
-    """Columns to show over slip, and what each is divided by (rows,), by title.
-
-    T / (W r), or torque where the radius (m) is NaN; drawbar pull over load; sinkage.
-    """
-    load, one = table["load_N"], np.ones(len(table))
-    of_radius = np.isfinite(radius)
-    known = {
-        "torque / (load × radius)" if of_radius else "torque, N m":
-            ("torque_Nm", load * radius if of_radius else one),
-        "drawbar pull / load": ("drawbar_pull_N", load),
-        "sinkage, mm": ("sinkage_m", 1e-3 * one),
-    }  # fmt: skip
-    return {title: panel for title, panel in known.items()
-            if panel[0] in table and np.isfinite(table[panel[0]]).any()}  # fmt: skip
-
-
-def draw_over_slip(axes: Axes, table: Table, title: str, key: str, unit: Floats) -> None:
-    """Draw a column over slip with 90 % intervals, in a colour for each load."""
-    loads = table["load_N"]
-    groups = load_levels(loads).index
-    std, slip_std = _std(table, key), _std(table, "slip")
-    for k in range(int(groups.max()) + 1):
-        rows = groups == k
-        colour = LOADS[round(k * (len(LOADS) - 1) / max(1, groups.max()))]
-        axes.errorbar(
-            table["slip"][rows], (table[key] / unit)[rows],
-            Z_90 * (std / unit)[rows], Z_90 * slip_std[rows],
-            fmt="o", ms=4, color=colour, elinewidth=1, label=f"{np.median(loads[rows]):.3g} N",
-        )  # fmt: skip
-    axes.axhline(0.0, color=PRIOR, lw=0.8, zorder=0)
-    axes.set_xlabel("slip")
-    axes.set_title(title)
-    axes.legend(title="load", title_fontsize=9)
+def rows_over_slip(table: Table) -> Picture:
+    """The rows over slip: a panel for each channel that was measured, in a colour for each load."""
+    shown = [[n] for n in _SHOWN[4:] if n in table and np.isfinite(table[n]).any()]
+    levels, loads = load_levels(table["load_N"]).index, table["load_N"]
+    usual = np.asarray([np.median(loads[levels == k]) for k in range(int(levels.max()) + 1)])
+    caption = "Bars are standard errors of each row, from its scatter. Errors that all rows share "
+    return column_picture(
+        table.columns | {"load_N": usual[levels]}, "slip", shown or [["torque_Nm"]], ["load_N"],
+        title="The rows over slip", caption=f"{caption}come in addition.", points=True,
+    )  # fmt: skip
 
 
 def _std(table: Table, key: str) -> Floats:

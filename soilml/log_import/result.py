@@ -10,7 +10,7 @@ import numpy as np
 from soilml.config.measurement_noise import Noise
 from soilml.io.table import Table
 from soilml.log_import.channels.wheel_quantities import SharedError
-from soilml.log_import.rows import WheelSeries
+from soilml.log_import.wheel_rows import WheelSeries
 from soilml.log_import.windows.steady import Stretch
 from soilml.remarks import Remark
 from soilml.results import Result

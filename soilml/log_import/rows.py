@@ -53,17 +53,6 @@ class WindowRow:
     std: dict[str, float]
 
 
-@dataclass(frozen=True)
-class WheelSeries:
-    """The quantities of one wheel in one run over time, and the stretches of the run."""
-
-    run: str  # Name of the run in the table
-    time: Floats  # Grid (n,), s
-    quantities: dict[str, Floats]  # Samples (n,) by name
-    stretches: tuple[Stretch, ...]  # Steady windows and what is left out
-    notes: tuple[Remark, ...] = ()  # What was repaired, tared or doubted in this run
-
-
 def by_name(dictionaries: Sequence[Mapping[str, float]]) -> dict[str, Floats]:
     """Numbers of rows as columns (rows,), NaN where a row has none."""
     names = dict.fromkeys(name for one in dictionaries for name in one)

@@ -19,7 +19,6 @@ from soilml.log_import.checks.sensors import dead_sensors, drop_clipped, untared
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.readers import Progress
 from soilml.log_import.rows import (
-    WheelSeries,
     WindowRow,
     add_stated_errors,
     by_name,
@@ -35,22 +34,49 @@ from soilml.remarks import Remark
 
 
 @dataclass
-class RunOfWheel:
-    """One run of a wheel, over time or as lines of a table.
+class WheelSeries:
+    """One wheel in one run: quantities over time, or lines of a table; and its rows.
 
-    rows: All of them; `kept` are those that can be used.
-    odd: Why rows are irregular, by their places.
-    stretches: What is left out, with the reason.
+    run: Name of the run in the table.
+    quantities: Samples (n,) by name, at the `time` (n,), s.
+    stretches: Steady windows and what is left out, with the reason.
     """
 
-    run: Run
+    source: Run
+    wheel: WheelMap
     inputs: Inputs | None = None
-    dead: dict[str, str] = field(default_factory=dict)
+    dead: dict[str, str] = field(default_factory=dict)  # Sensors, with the reason
     quantities: dict[str, Floats] = field(default_factory=dict)
     rows: list[WindowRow] = field(default_factory=list)
-    odd: dict[int, Remark] = field(default_factory=dict)
-    kept: list[WindowRow] = field(default_factory=list)
-    stretches: list[Stretch] = field(default_factory=list)
+    odd: dict[int, Remark] = field(default_factory=dict)  # Why rows are irregular, by place
+    kept: list[WindowRow] = field(default_factory=list)  # Rows that can be used
+    left_out: list[Stretch] = field(default_factory=list)
+
+    @property
+    def run(self) -> str:
+        """Name of the run in the table."""
+        return "_".join(filter(None, (self.source.name, self.wheel.name)))
+
+    @property
+    def time(self) -> Floats:
+        """Grid (n,), s; empty for lines of a table."""
+        return np.zeros(0) if self.inputs is None else self.inputs.time
+
+    @property
+    def stretches(self) -> list[Stretch]:
+        """Steady windows and what is left out, in order of time."""
+        windows = (row.window for row in self.kept)
+        return sorted([*self.left_out, *windows], key=lambda s: s.start)
+
+    @property
+    def notes(self) -> tuple[Remark, ...]:
+        """What was repaired, tared or doubted in this run."""
+        tared = () if self.inputs is None else self.inputs.notes
+        dead = (
+            Remark("dead-sensor", f"[{role}] is dead: {why}", (role,))
+            for role, why in self.dead.items()
+        )
+        return (*self.source.notes, *tared, *dead)
 
 
 class WheelRows:
@@ -63,10 +89,10 @@ class WheelRows:
         self.log_map, self.wheel = log_map, wheel
         self.of = f" of wheel {wheel.name}" if wheel.name else ""
         self.conversion = Conversion(wheel, log_map.vehicle)
-        self.runs = [RunOfWheel(run) for run in runs]
+        self.runs = [WheelSeries(run, wheel) for run in runs]
         if log_map.runs.each_row:
             for one in self.runs:
-                one.rows = table_rows(one.run, self.conversion)
+                one.rows = table_rows(one.source, self.conversion)
         else:
             self._find_windows(progress)
         # the slip of stances may be what is asked for
@@ -74,13 +100,13 @@ class WheelRows:
         for one in self.runs:
             for k, row in enumerate(one.rows):
                 if why := unusable(row, one.dead, needed) or one.odd.get(k):
-                    one.stretches.append(replace(row.window, why=why))
+                    one.left_out.append(replace(row.window, why=why))
                 else:
                     one.kept.append(row)
 
     def _find_windows(self, progress: Progress) -> None:
         """Find the rows of runs over time."""
-        inputs = [wheel_inputs(one.run, self.wheel) for one in self.runs]
+        inputs = [wheel_inputs(one.source, self.wheel) for one in self.runs]
         stage = f"finding steady windows{self.of}"
         for i, (one, own, dead) in enumerate(
             zip(self.runs, inputs, dead_sensors(inputs), strict=True)
@@ -91,7 +117,7 @@ class WheelRows:
                 own.values[role] = np.full(own.time.size, np.nan)
             one.rows = self._windows(one, own)
             clipped = drop_clipped(own, one.rows)
-            self.computed += [r.under(f"run {one.run.name}: ") for r in clipped]
+            self.computed += [r.under(f"run {one.source.name}: ") for r in clipped]
             one.odd = irregular_windows(one.rows) if self.wheel.leg is None else {}
         progress(stage, len(self.runs), len(self.runs))
         pool_errors([row for one in self.runs for k, row in enumerate(one.rows)
@@ -100,12 +126,12 @@ class WheelRows:
             for row in one.rows:
                 add_stated_errors(row, own, self.conversion)
 
-    def _windows(self, one: RunOfWheel, inputs: Inputs) -> list[WindowRow]:
+    def _windows(self, one: WheelSeries, inputs: Inputs) -> list[WindowRow]:
         """The rows of a run over time; what is left out of it joins its stretches."""
         angle = leg_angle(inputs, self.wheel) if self.wheel.leg is not None else None
         quantities = self.conversion.of({**inputs.values, **inputs.constants})
         one.quantities = {n: np.broadcast_to(v, inputs.time.shape) for n, v in quantities.items()}
-        settings, name = self.log_map.windows, one.run.name
+        settings, name = self.log_map.windows, one.source.name
         left_out = tuple(e for e in self.log_map.left_out if e.run in ("", name))
         parts: Iterator[tuple[Stretch, Stretch | None]]
         if angle is not None:
@@ -116,9 +142,9 @@ class WheelRows:
         rows = []
         for stretch, within in parts:
             if stretch.why:
-                one.stretches.append(stretch)
+                one.left_out.append(stretch)
                 continue
-            row = window_row(stretch, inputs, quantities, one.run, self.conversion, within)
+            row = window_row(stretch, inputs, quantities, one.source, self.conversion, within)
             if within is not None and "vibration" in inputs.values:
                 largest, error = largest_acceleration(inputs, stretch, within)
                 row.values["vibration"], row.std["vibration"] = largest, error
@@ -128,7 +154,7 @@ class WheelRows:
     def hints(self) -> list[Remark]:
         """What says that the map is wrong, by all windows, left out or not."""
         source = f"{self.log_map.source}: "
-        units = unit_remarks(self.wheel, self.runs[0].run)
+        units = unit_remarks(self.wheel, self.runs[0].source)
         wrong = [r.under(source) for r in units if r.code == "unit-of-another-kind"]
         return [*wrong, *self._checked([row for one in self.runs for row in one.rows], True)]
 
@@ -149,41 +175,23 @@ class WheelRows:
         found = [*self.computed, *self._checked(kept, False)]
         for one in self.runs:
             if one.inputs is None:
-                file = one.run.recordings[0].file.name
+                file = one.source.recordings[0].file.name
                 found += [s.why.under(f"row {s.start + 1:.0f} of {file} is left out: ")
-                          for s in one.stretches if s.why]  # fmt: skip
+                          for s in one.left_out if s.why]  # fmt: skip
             elif len(one.dead) > 2 and len(one.dead) >= len(one.inputs.values) - 1:
-                text = f"run {one.run.name}: no sensor{self.of} says anything: an empty log?"
-                found.append(Remark("empty-log", text, (one.run.name,)))
+                text = f"run {one.source.name}: no sensor{self.of} says anything: an empty log?"
+                found.append(Remark("empty-log", text, (one.source.name,)))
             else:
                 for role, why in one.dead.items():
-                    text = f"run {one.run.name}: the sensor of [{role}]{self.of} is dead: {why}"
-                    found.append(Remark("dead-sensor", text, (role, one.run.name)))
+                    text = f"run {one.source.name}: the sensor of [{role}]{self.of} is dead: {why}"
+                    found.append(Remark("dead-sensor", text, (role, one.source.name)))
         if self.log_map.runs.each_row:
             return found
         found += untared_sensors(self.wheel, [one.inputs for one in self.runs if one.inputs])
-        units = unit_remarks(self.wheel, self.runs[0].run)
+        units = unit_remarks(self.wheel, self.runs[0].source)
         return found + [remark for remark in units if remark.code == "unit-differs"]
 
     def shared_errors(self) -> tuple[dict[str, Noise], list[SharedError]]:
         """The errors that the rows share by the constants of the map."""
         means = by_name([row.means for one in self.runs for row in one.kept])
         return self.conversion.shared_errors(means) if means else ({}, [])
-
-    def series(self, i: int) -> WheelSeries:
-        """Quantities and stretches of one run."""
-        one = self.runs[i]
-        assert one.inputs is not None
-        stretches = [*one.stretches, *(row.window for row in one.kept)]
-        dead = (
-            Remark("dead-sensor", f"[{role}] is dead: {why}", (role,))
-            for role, why in one.dead.items()
-        )
-        name = one.run.name
-        return WheelSeries(
-            run=f"{name}_{self.wheel.name}" if self.wheel.name else name,
-            time=one.inputs.time,
-            quantities=one.quantities,
-            stretches=tuple(sorted(stretches, key=lambda s: s.start)),
-            notes=(*one.run.notes, *one.inputs.notes, *dead),
-        )

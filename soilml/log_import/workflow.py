@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -75,17 +77,13 @@ def import_log(
     runs = runs_of_rows(recordings, found) if steady else runs_of(recordings, found)
     parts = [part for w in found.wheels for part in wheels_by_gear(found, w, runs)]
     wheels = [WheelRows(found, wheel, [runs[i] for i in own], said) for wheel, own in parts]
-    # by run: its wheels, each in the analysis that has its gear, and the run's place there
-    by_run = [
-        (run, wheel, own.index(i))
-        for i, run in enumerate(runs)
-        for wheel, (_, own) in zip(wheels, parts, strict=True)
-        if i in own
-    ]
+    # by run: its wheels, each in the analysis that has its gear
+    each = [zip(own, w.runs, strict=True) for w, (_, own) in zip(wheels, parts, strict=True)]
+    by_run = [one for _, one in sorted(chain(*each), key=lambda e: e[0])]
     wrong = [hint for wheel in wheels for hint in wheel.hints()]
     if wrong and not accept:
         raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
-    groups = [(w.wheel, run, w.runs[k].kept) for run, w, k in by_run]
+    groups = [(one.wheel, one.source, one.kept) for one in by_run]
     table = rows_as_table(groups, found.source, timed=not steady)
     remarks = [remark for wheel in wheels for remark in wheel.remarks()]
     if len(table) == 0:
@@ -97,11 +95,13 @@ def import_log(
     bias, shared = largest_errors([wheel.shared_errors() for wheel in wheels])
     radii = {wheel.wheel.radius.value if wheel.wheel.radius else None for wheel in wheels}
     radius = radii.pop() if len(radii) == 1 else None
+    for one in by_run:
+        one.source = replace(one.source, recordings=(), times=())  # a result keeps no log
     return ImportedLog(
         table=table,
         bias=bias,
         shared=tuple(shared),
-        series=() if steady else tuple(wheel.series(k) for _, wheel, k in by_run),
+        series=() if steady else tuple(by_run),
         remarks=tuple(dict.fromkeys(remarks)),
         implausible=tuple(wrong),
         radius=radius or float("nan"),
@@ -113,7 +113,7 @@ def import_log(
 def _most_frequent(wheels: Sequence[WheelRows]) -> str:
     """The reason for which most of the time was left out."""
     seconds: dict[Remark | None, float] = {}
-    for s in (s for wheel in wheels for one in wheel.runs for s in one.stretches):
+    for s in (s for wheel in wheels for one in wheel.runs for s in one.left_out):
         seconds[s.why] = seconds.get(s.why, 0.0) + s.stop - s.start
     most = max(seconds, key=lambda why: seconds[why], default=None)
     return most.text if most else "the logs are empty"

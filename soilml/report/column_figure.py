@@ -43,6 +43,7 @@ def column_picture(
     title: str = "The table",
     caption: str = "",
     measured: Columns | None = None,
+    points: bool = False,
 ) -> Picture:
     """Columns of a table against one of them.
 
@@ -52,11 +53,12 @@ def column_picture(
     panels: Names of the columns of each panel.
     lines: Names of columns whose values tell lines apart.
     measured: Readings of the same quantities, which are drawn as points.
+    points: Draw the columns as points too, without lines.
     """
     across = 2 if len(panels) == 4 else min(len(panels), _MOST_ACROSS)
     rows = -(-len(panels) // across)
     names = ", ".join(shown_column(name)[1] for names in panels for name in names)
-    draw = partial(_draw, columns, x, panels, lines, measured or {})
+    draw = partial(_draw, columns, x, panels, lines, measured or {}, points)
     size = (1.0 + 3.9 * across, 0.6 + 3.1 * rows)
     text = f"{names} against {shown_column(x)[1]}"
     return Picture(title, draw, rows, across, size, text, caption)
@@ -68,6 +70,7 @@ def _draw(
     panels: Sequence[Sequence[str]],
     lines: Sequence[str],
     measured: Columns,
+    points: bool,
     axes: Any,
 ) -> None:
     groups = list(_groups(columns, x, lines))
@@ -81,7 +84,8 @@ def _draw(
                 # colours tell lines apart, or the columns of the one line
                 colour = COLOURS[(i if said else j) % len(COLOURS)]
                 label = said if said and j == 0 else "" if said else _words(name)
-                _line(panel, columns, x, name, rows, colour, _STYLES[j * bool(said) % 4], label)
+                style = "" if points else _STYLES[j * bool(said) % 4]
+                _line(panel, columns, x, name, rows, colour, style, label)
         for j, name in enumerate(names):
             if name in measured:
                 panel.plot(
@@ -117,7 +121,7 @@ def _line(
             panel.fill_between(places, low, high, color=shade, alpha=alpha, lw=0, label=said)
     std = columns.get(f"{name}_std")
     errors = None if std is None else shown_column(name)[0] * np.asarray(std, float)[at]
-    marker = "o" if at.size <= _FEW else ""
+    marker = "o" if at.size <= _FEW or not style else ""
     panel.errorbar(
         places, values, errors, color=colour, ls=style, marker=marker, ms=4, lw=1.4, capsize=2,
         label=label,

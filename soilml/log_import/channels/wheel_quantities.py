@@ -12,18 +12,15 @@ from typing import Any
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.config.measurement_noise import Noise
+from soilml.config.measurement_noise import KNOWN_PARTS, Noise
 from soilml.errors import InputError, did_you_mean
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.mapping.channel_map import GEARED, Uncertain
 from soilml.log_import.mapping.log_map import LogMap, Vehicle, WheelMap
-from soilml.quantities import column
+from soilml.quantities import COLUMNS, column
 
-#: Whether [bias] of a model file can say an offset of a quantity, and a share.
-_FORMS = {
-    "slip": (True, False), "load": (False, True), "torque": (True, True), "sinkage": (True, False),
-    "drawbar_pull": (True, False),
-}  # fmt: skip
+#: Names of the offset and of the share that [bias] of a model file can state of a quantity.
+_FORMS = {COLUMNS[key].name: parts for key, parts in KNOWN_PARTS.items()}
 
 
 @dataclass(frozen=True)
@@ -165,7 +162,7 @@ class Conversion:
                 as_share = by_share < by_offset
                 if len(reading) == 1 and has_offset:
                     as_share = not name.endswith(("offset", "idle_current"))
-                as_share = has_share and size > 0.0 and (as_share or not has_offset)
+                as_share = bool(has_share) and size > 0.0 and (as_share or not has_offset)
                 one = Noise(share=rms / size) if as_share else Noise(constant=rms)
                 bias[column(key)] = _joined(bias.get(column(key), Noise()), one, np.hypot)
         order = [column(key) for key in _FORMS if column(key) in bias]

@@ -8,7 +8,7 @@ what either has of the load.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -29,6 +29,7 @@ _RIVALS = (
     ("torque", "motor_current"),
 )
 _TURNING, _TRAVEL = {*_RIVALS[0]}, {*_RIVALS[1]}
+_PLACES = ("wheel_angle", "position")  # Whose rate is a speed
 _MEASURED = 3.0  # What a measured torque is worth over a current, whose constants no log shows
 _LEAST = 2.0  # Lowest score of a guess
 #: Words of a place in the world; least range of a part of the way, over that of another one.
@@ -210,9 +211,9 @@ def by_behaviour(
     if forces and len(all_moments) == 1:  # of whatever axis
         moments = all_moments
     group = [*forces, *moments]
-    means = _Means(run, candidates, group[0].address) if group else None
-    if means is None or means.count < _FEWEST:
+    if not group or run.find(group[0].address)[0].size < _FEWEST:
         return list(candidates), {}
+    means, driving = _block_means(run, candidates, group[0].address)
     given: dict[str, str] = {}
     reasons: dict[str, str] = {}
     named = {
@@ -220,13 +221,13 @@ def by_behaviour(
         for role in _FORCE_ROLES
         if (own := [c for c in candidates if c not in group and c.score(role) >= _BY_BEHAVIOUR])
     }
-    if "load" not in named and (load := _load(forces, means, reasons)):
+    if "load" not in named and (load := _load(forces, means, driving, reasons)):
         given["load"] = load
     steady = given.get("load") or named.get("load", "")
     pulls = [c.address for c in forces if c.address != steady]
     turning = [named["torque"]] if "torque" in named else [c.address for c in moments]
     pulls = [named["drawbar_pull"]] if "drawbar_pull" in named else pulls
-    *pair, together = _pair(pulls, turning, means, steady)
+    *pair, together = _pair(pulls, turning, means, driving, steady)
     for role, address, others in zip(_FORCE_ROLES[1:], pair, (forces, moments), strict=True):
         alone = role == "torque" and len(moments) == 1 and together < _TOGETHER_FROM
         if role not in named and not alone and any(c.address == address for c in others):
@@ -270,47 +271,42 @@ def _is_alike(candidate: Candidate, moments: bool) -> bool:
     return bool(words & (_MOMENTS if moments else _FORCES))
 
 
-class _Means:
-    """Block means of the columns of a run, and the blocks in which the wheel drives.
+def _block_means(
+    run: Run, candidates: Sequence[Candidate], first: str
+) -> tuple[dict[str, Floats], NDArray[np.bool_]]:
+    """Means (blocks,) by address, forces in N and moments in N m where they state a unit; and the
+    blocks in which the best column of a speed, or of a place, moves, else all.
 
     The blocks are those of the recording of `first`, whose clock the others are brought to.
     """
-
-    def __init__(self, run: Run, candidates: Sequence[Candidate], first: str) -> None:
-        self._run, (times, _) = run, run.find(first)
-        self.count = min(_BLOCKS, times.size)
-        self._grid = np.linspace(times[0], times[-1], self.count)
-        self._columns = {c.address: c for c in candidates}
-        self.driving = self._motion(candidates)
-
-    def of(self, address: str) -> Floats:
-        """Means (blocks,) of a column, forces in N and moments in N m where they state a unit."""
-        column = self._columns[address]
-        size = 9.80665 if column.kind == "kg" else 1.0
-        if column.kind in ("N", "N m", "kg"):
-            size *= factor(column.unit, column.kind)
-        means = size * on_grid(self._grid, *self._run.find(address))
-        known = np.isfinite(means)
-        return np.where(known, means, np.median(means[known]) if known.any() else 0.0)
-
-    def _motion(self, candidates: Sequence[Candidate]) -> NDArray[np.bool_]:
-        """The blocks in which the best column of a speed, or of a place, moves; else all."""
-        roles = ("wheel_speed", "rim_speed", "wheel_angle", "ground_speed", "position")
-        best = max(((c.score(role), role, c.address) for role in roles for c in candidates),
-                   key=lambda s: s[0], default=(0.0, "", ""))  # fmt: skip
-        if best[0] > 2.0:
-            speed = self.of(best[2])
-            if best[1] in ("wheel_angle", "position") and speed.size > 2:
-                speed = np.gradient(speed)
-            driving: NDArray[np.bool_] = np.abs(speed) > _DRIVES * np.percentile(np.abs(speed), 90)
-            if driving.sum() > 2:
-                return driving
-        return np.ones(self.count, dtype=bool)
+    times, _ = run.find(first)
+    grid, found = np.linspace(times[0], times[-1], min(_BLOCKS, times.size)), {}
+    for c in candidates:
+        size = 9.80665 if c.kind == "kg" else 1.0
+        if c.kind in ("N", "N m", "kg"):
+            size *= factor(c.unit, c.kind)
+        own = size * on_grid(grid, *run.find(c.address))
+        known = np.isfinite(own)
+        found[c.address] = np.where(known, own, np.median(own[known]) if known.any() else 0.0)
+    roles = ("wheel_speed", "rim_speed", "wheel_angle", "ground_speed", "position")
+    score, role, address = max(((c.score(role), role, c.address) for role in roles
+                                for c in candidates), key=lambda s: s[0])  # fmt: skip
+    if score > 2.0:
+        speed = np.abs(np.gradient(found[address]) if role in _PLACES else found[address])
+        driving: NDArray[np.bool_] = speed > _DRIVES * np.percentile(speed, 90)
+        if driving.sum() > 2:
+            return found, driving
+    return found, np.ones(grid.size, dtype=bool)
 
 
-def _load(forces: Sequence[Candidate], means: _Means, reasons: dict[str, str]) -> str:
+def _load(
+    forces: Sequence[Candidate],
+    means: Mapping[str, Floats],
+    driving: NDArray[np.bool_],
+    reasons: dict[str, str],
+) -> str:
     """The largest force that is steady while the wheel drives; "" for none."""
-    driven = {c.address: means.of(c.address)[means.driving] for c in forces}
+    driven = {c.address: means[c.address][driving] for c in forces}
     levels = {address: abs(float(np.median(own))) for address, own in driven.items()}
     steady = {a: level for a, level in levels.items() if np.std(driven[a]) < _STEADY * level}
     best = max(steady, key=lambda a: (steady[a], a), default="")
@@ -326,15 +322,19 @@ def _load(forces: Sequence[Candidate], means: _Means, reasons: dict[str, str]) -
 
 
 def _pair(
-    pulls: Sequence[str], turning: Sequence[str], means: _Means, load: str
+    pulls: Sequence[str],
+    turning: Sequence[str],
+    means: Mapping[str, Floats],
+    driving: NDArray[np.bool_],
+    load: str,
 ) -> tuple[str, str, float]:
     """Pull and torque: the force and the moment that vary most together, and their correlation.
 
     What varies with the load is taken off first: lateral forces and the moments that they make.
     """
-    weight = means.of(load) if load else np.zeros(means.count)
-    size = abs(float(np.median(weight[means.driving])))
-    left = {address: _beside(means.of(address), weight) for address in (*pulls, *turning)}
+    weight = means[load] if load else np.zeros(driving.size)
+    size = abs(float(np.median(weight[driving])))
+    left = {address: _beside(means[address], weight) for address in (*pulls, *turning)}
     spread = {address: float(np.std(own)) for address, own in left.items()}
     lively = [a for a in pulls if spread[a] > _VARIES * size]
     best, most, correlation = ("", ""), 0.0, 0.0

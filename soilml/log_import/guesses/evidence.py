@@ -160,20 +160,15 @@ class Judge:
         lever = float(np.nanmedian(np.abs(means["torque"]))) / size
         low, high = (r * radius for r in TRACTION) if radius else _USUAL_LEVER
         for role, other, power in (("torque", "load", 1), ("load", "torque", -1)):
+            draft, known = drafts.get(role), other not in drafts or drafts[other].stated_unit
+            if draft is None or not known or not low < lever < high:
+                continue
 
             def fits(x: float, power: int = power) -> bool:
                 return low < lever * x**power < high
 
-            if (
-                role not in drafts
-                or not fits(1.0)
-                or (other in drafts and not drafts[other].stated_unit)
-            ):
-                continue
-            alone = (
-                drafts[role].stated_unit and sum(c.kind == UNITS[role] for c in self.columns) == 1
-            )
-            if (drafts[role].word or alone) and _only_unit(drafts[role], fits):
+            alone = draft.stated_unit and sum(c.kind == UNITS[role] for c in self.columns) == 1
+            if (draft.word or alone) and _only_unit(draft, fits):
                 yield role, f"torque over load is {lever:.2g} m, as of a wheel"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from soilml.io.toml_text import toml_value
 from soilml.log_import.channels.runs import run_names, runs_of
@@ -52,15 +52,6 @@ _HEAD = """\
 # The columns, with the unit that the log states and where 98 % of their values lie:"""
 
 
-@dataclass(frozen=True)
-class DraftedMap:
-    """A map as TOML with comments, how many of its lines are marked, and the evidence as text."""
-
-    text: str
-    marked: int
-    evidence: str
-
-
 def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
     """Look at logs and write a map with guesses, each with its reason, as TOML with comments.
 
@@ -74,13 +65,12 @@ def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) ->
 
 def draft_map(
     logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], progress: Progress = silent
-) -> DraftedMap:
-    """What `init_map` gives, with the number of lines that are marked."""
+) -> WrittenMap:
+    """The map of which `init_map` gives the text."""
     recordings = read_logs(log_files(logs), progress)
     for log in recordings:
         refuse_a_table_of_runs(log)
-    found, evidence = _Guess(recordings).map()
-    return DraftedMap(found.text, found.marked, evidence)
+    return _Guess(recordings).map()
 
 
 class _Guess:
@@ -106,8 +96,8 @@ class _Guess:
         candidates, self.reasons = by_behaviour(self.usable, self.run)
         self.found = assign(candidates)
 
-    def map(self) -> tuple[WrittenMap, str]:
-        """The whole map, with a mark on the channels that lack evidence; and the evidence."""
+    def map(self) -> WrittenMap:
+        """The whole map, with a mark on the channels that lack evidence."""
         shared, wheels = self.found.shared, self.found.wheels
         drafts, evidence = self._drafts()
         first = next(iter(drafts.values()))
@@ -134,7 +124,7 @@ class _Guess:
                 left = [key for key in draft.keys if key not in alike[role]]
                 tables.append(draft.only(f"wheels.{name}.{role}", left))
         tables += [] if self.steady else self._window_tables()
-        return WrittenMap(self._head(), tables), evidence
+        return WrittenMap(self._head(), tables, evidence)
 
     def _drafts(self) -> tuple[dict[str, dict[str, Draft]], str]:
         """The channels of each wheel, of "" where there is one, and the evidence for them."""

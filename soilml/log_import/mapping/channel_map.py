@@ -41,18 +41,22 @@ class Uncertain:
 
 @dataclass(frozen=True)
 class UncertainIn:
-    """A number or a text such as `"0.15 m +- 1 %"`, above `above`; without its error if `exact`."""
+    """A number or a text such as `"0.15 m +- 1 %"`, above `above`; without its error if `exact`.
 
-    unit: str
+    `unit` is that of soilml; "" for the unit of the channel.
+    """
+
+    unit: str = ""
     above: float = -math.inf
     exact: bool = False
 
     def take(self, settings: Settings, key: str, kind: str) -> Any:
         """The value; raises `InputError` for a wrong form and for one that is too small."""
-        example = f"'0.15 {self.unit} +- 1 %'" if self.unit != "1" else "'0.7 +- 0.05'"
-        needed = f"a number in {self.unit}, or a text such as {example}"
+        unit = self.unit or UNITS[kind]
+        example = f"'0.15 {unit} +- 1 %'" if unit != "1" else "'0.7 +- 0.05'"
+        needed = f"a number in {unit}, or a text such as {example}"
         given = settings.take(key, (int, float, str), needed)
-        found = parse_uncertain(given, self.unit, f"{settings.where} {key}")
+        found = parse_uncertain(given, unit, f"{settings.where} {key}")
         if found is None or found.std < 0.0:
             settings.fail(f"{key} is {given!r}; needed is {needed}")
         if not found.value > self.above:
@@ -137,14 +141,6 @@ class _Columns:
         return tuple(names)
 
 
-class _InUnitOfRole:
-    """An uncertain value in the unit of the channel."""
-
-    def take(self, settings: Settings, key: str, role: str) -> Uncertain:
-        found: Uncertain = UncertainIn(UNITS[role]).take(settings, key, role)
-        return found
-
-
 @dataclass(frozen=True)
 class ChannelMap:
     """A channel of a map; the fields are the keys of its table.
@@ -169,7 +165,7 @@ class ChannelMap:
 
     role: str
     columns: Annotated[tuple[str, ...], Key("column"), _Columns()] = ()
-    value: Annotated[Uncertain | None, _InUnitOfRole()] = None
+    value: Annotated[Uncertain | None, UncertainIn()] = None
     name_pattern: Annotated[
         re.Pattern[str] | None, Key("file_name"), Pattern((1, 1), "the number")
     ] = None
@@ -177,7 +173,7 @@ class ChannelMap:
         None
     )
     unit: str = ""
-    one: Annotated[Uncertain | None, Key("scale"), _InUnitOfRole()] = None
+    one: Annotated[Uncertain | None, Key("scale"), UncertainIn()] = None
     counts_per_turn: Annotated[float, UncertainIn("1", above=0.0, exact=True)] = 0.0
     reverse: bool = False
     tare: Annotated[

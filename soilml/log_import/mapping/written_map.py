@@ -8,7 +8,6 @@ from typing import Any
 
 from soilml.io.cell_text import one_line
 from soilml.io.toml_text import toml_value
-from soilml.optional_imports import tomllib
 
 
 class Marked(str):
@@ -60,15 +59,11 @@ class WrittenTable:
 
 @dataclass
 class WrittenMap:
-    """A map as its tables in order, below lines of comment on the logs."""
+    """A map as its tables in order, below lines of comment on the logs; what speaks for it."""
 
     head: list[str]
     tables: list[WrittenTable]
-
-    @property
-    def content(self) -> dict[str, Any]:
-        """What the text holds, as nested dictionaries."""
-        return tomllib.loads(self.text)
+    evidence: str
 
     @property
     def text(self) -> str:

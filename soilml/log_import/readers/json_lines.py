@@ -46,30 +46,25 @@ def read_json_log(path: Path) -> list[Recording]:
     return [Recording("", path, columns, texts, clock=clock, notes=notes)]
 
 
+def _parsed(text: str) -> Any:
+    """What a text in JSON holds; None for another one."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+
+
 def _samples(text: str) -> tuple[list[dict[str, Any]], int]:
     """The objects of a log, and how many lines are none."""
-    try:
-        whole = json.loads(text)
-    except (ValueError, RecursionError):
-        whole = None
+    whole = _parsed(text)
     if isinstance(whole, dict):
         whole = _rows_of_columns(whole)
     if whole is not None:
         rows = [row for row in whole if isinstance(row, dict)] if isinstance(whole, list) else []
         return rows, 0
-    rows, bad = [], 0
-    for line in text.splitlines():
-        if not line.strip():
-            continue
-        try:
-            row = json.loads(line)
-        except (ValueError, RecursionError):
-            row = None
-        if isinstance(row, dict):
-            rows.append(row)
-        else:
-            bad += 1
-    return rows, bad
+    found = [_parsed(line) for line in text.splitlines() if line.strip()]
+    rows = [row for row in found if isinstance(row, dict)]
+    return rows, len(found) - len(rows)
 
 
 def _rows_of_columns(columns: dict[str, Any]) -> list[dict[str, Any]]:

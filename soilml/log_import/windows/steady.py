@@ -22,6 +22,8 @@ _WATCHED = {"rim_speed": 0.01, "speed": 0.015, "slip": 0.01, "torque": 0.03, "lo
 #: Most values in the search, and shortest stretch over which samples are averaged for it, s.
 _MOST_VALUES, _SHORTEST_MEAN = 500, 0.1
 _MISSING = 0.2  # Largest share of missing samples in a window
+#: Largest change of the slip within a window, and of the torque, as a share of it.
+_SLIP_CHANGE, _TORQUE_CHANGE = 0.05, 0.15
 _SIGNIFICANT = 4.0  # A change within a window counts where it is this many standard errors
 #: Share of the usual speed, or of the usual torque, below which a wheel is at rest.
 _AT_REST = 0.1
@@ -183,10 +185,10 @@ class _Search:
             third = len(values) // 3
             first, last = (mean_error(v, self.step) for v in (values[:third], values[-third:]))
             change, error = abs(last[0] - first[0]), float(np.hypot(first[1], last[1]))
-            limit = self.settings.largest_slip_change
+            limit = _SLIP_CHANGE
             if name == "torque":
                 usual = float(np.nanmean(np.abs(values)))
-                limit = self.settings.largest_torque_change * usual
+                limit = _TORQUE_CHANGE * usual
             if change > limit and not change < _SIGNIFICANT * error:
                 text = f"it is not steady: {name} changes by {change:.2g} in it"
                 return Remark("not-steady", text, (name,), "note")

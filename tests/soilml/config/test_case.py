@@ -136,7 +136,7 @@ MISTAKES = {
             'torque_Nm = "small"': "'2 %' of the readings' range",
             "torque_Nm = -1": "zero or more",
             "slip_length = 0.2": "no channel has a discrepancy",
-            "torque_Nm = 1.0\nslip_length = 0": "slip_length is 0; a correlation length must",
+            "torque_Nm = 1.0\nslip_length = 0": "slip_length is 0; it must lie",
         }.items()
     },
     "no TOML": ("[gear]", "[gear", "not valid TOML"),
