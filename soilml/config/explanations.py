@@ -87,7 +87,8 @@ def _take(entry: Settings, effects: Effects, base: Case) -> CaseExplanation:
         before = gears[gear] if gear else model
         added, priors = take_effects([effect], effects, Model(before.gear))
         (new,) = added.effects
-        after = replace(before, effects=(*_without(before, new.name), new))
+        others = (own for own in before.effects if own.name != new.name)
+        after = replace(before, effects=(*others, new))
         if gear:
             gears[gear] = after
         else:
@@ -97,10 +98,6 @@ def _take(entry: Settings, effects: Effects, base: Case) -> CaseExplanation:
         prior |= {f"{head}.{path.partition('.')[2]}": v for path, v in priors.items()}
     entry.finish()
     return CaseExplanation(weight, model, soil, gears, prior)
-
-
-def _without(model: Model, name: str) -> tuple[Effect, ...]:
-    return tuple(own for own in model.effects if own.name != name)
 
 
 def _by_name(model: Model, gears: Mapping[str, Model]) -> dict[str, Effect]:

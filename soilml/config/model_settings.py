@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from soilml.errors import InputError, did_you_mean
 from soilml.io.declared_settings import in_si, take_declared, take_quantity
@@ -135,31 +136,28 @@ def take_prior(settings: Settings, key: str, *, unit: str = "1", about_zero: boo
     if about_zero:
         needed += ", or { normal = std }, or { half-normal = std }"
     value = settings.take(key, (list, dict), needed)
-    kind = next(iter(value)) if isinstance(value, dict) and len(value) == 1 else None
-    if about_zero and kind in NORMAL:
-        std = (
-            in_si(settings, key, value[kind], unit) if isinstance(value[kind], str) else value[kind]
-        )
-        if isinstance(std, bool) or not isinstance(std, int | float) or not 0.0 < std < math.inf:
-            settings.fail(f"{key}: {kind} is {std!r}; needed is a standard deviation above zero")
-        return NORMAL[kind](float(std))
-    log = False
-    if isinstance(value, dict):
-        log = value.get("scale") == "log"
-        if value.keys() - {"range", "scale"} or value.get("scale", "log") not in ("log", "linear"):
-            settings.fail(f"{key} is {value!r}; needed is {needed}")
-        value = value.get("range")
-    if isinstance(value, list):
-        value = [in_si(settings, key, x, unit) if isinstance(x, str) else x for x in value]
-    numbers = isinstance(value, list) and all(
-        isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) for x in value
-    )
-    if not numbers or len(value) != 2 or not value[0] < value[1]:
-        settings.fail(f"{key} is {value!r}; needed is {needed} with lower below upper")
-    lower, upper = float(value[0]), float(value[1])
-    if log and lower <= 0.0:
-        settings.fail(f"{key}: a logarithmic range must be positive, it begins at {lower:g}")
-    return Prior(lower, upper, log)
+    given = value if isinstance(value, dict) else {"range": value}
+
+    def number(x: Any) -> float:
+        x = in_si(settings, key, x, unit) if isinstance(x, str) else x
+        return float(x) if isinstance(x, int | float) and not isinstance(x, bool) else math.nan
+
+    kind = next(iter(given), "")
+    if about_zero and len(given) == 1 and kind in NORMAL:
+        if not 0.0 < (std := number(given[kind])) < math.inf:
+            settings.fail(
+                f"{key}: {kind} is {given[kind]!r}; needed is a standard deviation above zero"
+            )
+        return NORMAL[kind](std)
+    scale, ends = given.get("scale", "linear"), given.get("range")
+    if given.keys() - {"range", "scale"} or scale not in ("log", "linear"):
+        settings.fail(f"{key} is {value!r}; needed is {needed}")
+    numbers = [number(x) for x in ends] if isinstance(ends, list) else []
+    if len(numbers) != 2 or not -math.inf < numbers[0] < numbers[1] < math.inf:
+        settings.fail(f"{key} is {ends!r}; needed is {needed} with lower below upper")
+    if scale == "log" and numbers[0] <= 0.0:
+        settings.fail(f"{key}: a logarithmic range must be positive, it begins at {numbers[0]:g}")
+    return Prior(numbers[0], numbers[1], scale == "log")
 
 
 def _within_bounds(settings: Settings, key: str, prior: Prior, parameter: Parameter) -> Prior:
