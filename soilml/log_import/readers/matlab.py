@@ -43,12 +43,14 @@ def read_matlab(path: Path) -> list[Recording]:
     """
     with path.open("rb") as opened:
         head = opened.read(128)
-    if b"MATLAB 7.3" in head or head.startswith(b"\x89HDF"):
-        leaves, about = _hdf5_leaves(path)
-    else:
-        leaves, about = _version_5_leaves(path)
+    of_hdf5 = b"MATLAB 7.3" in head or head.startswith(b"\x89HDF")
     groups: dict[tuple[str, int], dict[str, Floats]] = {}
-    for place, array in leaves:
+    about: list[str] = []
+    for place, array in _hdf5_values(path) if of_hdf5 else _version_5_values(path):
+        if not _is_samples(array):
+            if np.ndim(array) == 0:
+                about.append(f"{place} = {array}")
+            continue
         parent, _, name = place.rpartition(".")
         if name.lower() in ("data", "values", "signals") and parent:
             # timeseries: X.Time and X.Data; the name of the signal says more than "Data"
@@ -64,7 +66,7 @@ def read_matlab(path: Path) -> list[Recording]:
         named = {f"{parent}[{length}]": columns for (parent, length), columns in groups.items()}
     if len(named) == 1:
         named = {"": next(iter(named.values()))}
-    return [Recording(name, path, columns, about=about) for name, columns in named.items()]
+    return [Recording(name, path, columns, about=tuple(about)) for name, columns in named.items()]
 
 
 def _split(name: str, array: Any) -> Iterator[tuple[str, Floats]]:
@@ -87,7 +89,7 @@ def _is_samples(array: Any) -> bool:
     )
 
 
-def _version_5_leaves(path: Path) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
+def _version_5_values(path: Path) -> Iterator[tuple[str, Any]]:
     need("scipy", "import")
     from scipy.io import loadmat
 
@@ -97,30 +99,26 @@ def _version_5_leaves(path: Path) -> tuple[list[tuple[str, Any]], tuple[str, ...
     except Exception as error:  # scipy raises many kinds for damaged files
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"{path} is not a complete MATLAB file: {first}") from None
-    leaves: list[tuple[str, Any]] = []
-    about: list[str] = []
-
-    def walk(place: str, value: Any, depth: int) -> None:
-        if depth > _DEEPEST:
-            return
-        if hasattr(value, "_fieldnames"):
-            for name in value._fieldnames:
-                walk(f"{place}.{name}", getattr(value, name), depth + 1)
-        elif isinstance(value, np.ndarray) and value.dtype == object:
-            for i, element in enumerate(value.reshape(-1)):
-                walk(f"{place}_{i + 1}", element, depth + 1)
-        elif isinstance(value, np.ndarray) and _is_samples(value):
-            leaves.append((place, value))
-        elif isinstance(value, str) or np.ndim(value) == 0:
-            about.append(f"{place} = {value}")
-
     for name, value in content.items():
         if not name.startswith("__"):
-            walk(name, value, 0)
-    return leaves, tuple(about)
+            yield from _values_in(name, value)
 
 
-def _hdf5_leaves(path: Path) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
+def _values_in(place: str, value: Any, depth: int = 0) -> Iterator[tuple[str, Any]]:
+    """The texts, numbers and arrays in structs and cells, with their places."""
+    if depth > _DEEPEST:
+        return
+    if hasattr(value, "_fieldnames"):
+        for name in value._fieldnames:
+            yield from _values_in(f"{place}.{name}", getattr(value, name), depth + 1)
+    elif isinstance(value, np.ndarray) and value.dtype == object:
+        for i, element in enumerate(value.reshape(-1), 1):
+            yield from _values_in(f"{place}_{i}", element, depth + 1)
+    else:
+        yield place, value
+
+
+def _hdf5_values(path: Path) -> list[tuple[str, Any]]:
     try:
         import h5py
     except ImportError:
@@ -128,9 +126,7 @@ def _hdf5_leaves(path: Path) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
             f"{path} is an HDF5 file, as MATLAB 7.3 writes them, which needs h5py: pip install "
             "'.[logs]'; or save it in MATLAB with save(..., '-v7')"
         ) from None
-    leaves: list[tuple[str, Any]] = []
-    about: list[str] = []
-
+    found: list[tuple[str, Any]] = []
     parts = total = 0
 
     def visit(name: str, item: Any) -> None:
@@ -143,13 +139,8 @@ def _hdf5_leaves(path: Path) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
             raise InputError(f"{path}: {name} is in another file; needed are all data in one")
         total += item.size or 0
         LOG_VALUES.check(path, max(total, math.prod(item.chunks or ())))
-        place = name.replace("/", ".")
         if item.dtype.kind in "iufb" and item.attrs.get("MATLAB_class", b"") != b"char":
-            values = np.squeeze(np.asarray(item))
-            if _is_samples(values):
-                leaves.append((place, values))
-            elif values.ndim == 0:
-                about.append(f"{place} = {values}")
+            found.append((name.replace("/", "."), np.squeeze(np.asarray(item))))
 
     try:
         with h5py.File(path, "r") as opened:
@@ -159,7 +150,7 @@ def _hdf5_leaves(path: Path) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
     except Exception as error:  # h5py raises many kinds for damaged files
         first = " ".join(str(error).split())
         raise InputError(f"{path} is not a complete HDF5 file: {first}") from None
-    return leaves, tuple(about)
+    return found
 
 
 def check_matlab_size(file: Path) -> None:
@@ -170,55 +161,51 @@ def check_matlab_size(file: Path) -> None:
     """
     if file.stat().st_size <= _HEAD:
         return
-    with file.open("rb") as opened, mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        order = {b"IM": "<", b"MI": ">"}.get(data[_HEAD - 2 : _HEAD])
-        if order is not None:
-            _Arrays(file, order).count(data, _HEAD, len(data))
+    values = parts = 0
 
-
-class _Arrays:
-    """Values and arrays of a file, counted element by element."""
-
-    def __init__(self, file: Path, order: str) -> None:
-        self.file, self.order = file, order
-        self.values = self.parts = 0
-
-    def tag(self, data: mmap.mmap | bytes, at: int) -> tuple[int, int, int, int]:
-        """Type of an element, where its content begins, its bytes, and where the next begins."""
-        kind, size = struct.unpack_from(f"{self.order}II", data, at)
-        if kind >> 16:  # a small element, whose content is in its tag
-            return kind & 0xFFFF, at + 4, kind >> 16, at + 8
-        return kind, at + 8, size, at + 8 + size + (0 if kind == _COMPRESSED else -size % 8)
-
-    def count(self, data: mmap.mmap | bytes, at: int, end: int, depth: int = 0) -> None:
-        """Count the elements between two places."""
-        DEPTH.check(self.file, depth)
+    def count(data: mmap.mmap | bytes, at: int, end: int, depth: int = 0) -> None:
+        """Count the values and arrays between two places, element by element."""
+        nonlocal values, parts
+        DEPTH.check(file, depth)
         while at + 8 <= end:
-            kind, start, size, after = self.tag(data, at)
+            kind, start, size, after = _tag(order, data, at)
             if kind == _COMPRESSED and isinstance(data, mmap.mmap):
                 with suppress(zlib.error):  # of a damaged file, as the library will say
                     unpacked = zlib.decompressobj().decompress(data[start:after], _MOST_BYTES)
-                    LOG_VALUES.check(self.file, len(unpacked) // 8)
-                    self.count(unpacked, 0, len(unpacked))
+                    LOG_VALUES.check(file, len(unpacked) // 8)
+                    count(unpacked, 0, len(unpacked))
             elif kind == _MATRIX:
-                self.parts += 1
-                PARTS.check(self.file, self.parts)
-                inner = self.after_shape(data, start, min(after, end))
-                self.count(data, inner, min(after, end), depth + 1)
+                parts += 1
+                PARTS.check(file, parts)
+                inner, claimed = _shape(order, data, start, min(after, end))
+                LOG_VALUES.check(file, claimed)  # which is allocated before it is read
+                count(data, inner, min(after, end), depth + 1)
             elif depth:
-                self.values += size // _BYTES.get(kind, 1)
-                LOG_VALUES.check(self.file, self.values)
+                values += size // _BYTES.get(kind, 1)
+                LOG_VALUES.check(file, values)
             at = after
 
-    def after_shape(self, data: mmap.mmap | bytes, at: int, end: int) -> int:
-        """Where the name of an array begins; what it claims is allocated before it is read."""
-        if at + 24 > end:  # an empty one has no flags
-            return end
-        _, flags, _, at = self.tag(data, at)
-        if struct.unpack_from(f"{self.order}I", data, flags)[0] & 0xFF == _OPAQUE:
-            return at
-        _, start, size, after = self.tag(data, at)
-        shape = data[start : min(start + size // 4 * 4, end)]
-        sizes = struct.unpack(f"{self.order}{len(shape) // 4}i", shape[: len(shape) // 4 * 4])
-        LOG_VALUES.check(self.file, math.prod(max(n, 0) for n in sizes))
-        return after
+    with file.open("rb") as opened, mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        if order := {b"IM": "<", b"MI": ">"}.get(data[_HEAD - 2 : _HEAD], ""):
+            count(data, _HEAD, len(data))
+
+
+def _tag(order: str, data: mmap.mmap | bytes, at: int) -> tuple[int, int, int, int]:
+    """Type of an element, where its content begins, its bytes, and where the next begins."""
+    kind, size = struct.unpack_from(f"{order}II", data, at)
+    if kind >> 16:  # a small element, whose content is in its tag
+        return kind & 0xFFFF, at + 4, kind >> 16, at + 8
+    return kind, at + 8, size, at + 8 + size + (0 if kind == _COMPRESSED else -size % 8)
+
+
+def _shape(order: str, data: mmap.mmap | bytes, at: int, end: int) -> tuple[int, int]:
+    """Where the name of an array begins, and how many values it claims."""
+    if at + 24 > end:  # an empty one has no flags
+        return end, 0
+    _, flags, _, at = _tag(order, data, at)
+    if struct.unpack_from(f"{order}I", data, flags)[0] & 0xFF == _OPAQUE:
+        return at, 0
+    _, start, size, after = _tag(order, data, at)
+    shape = data[start : min(start + size // 4 * 4, end)]
+    sizes = struct.unpack(f"{order}{len(shape) // 4}i", shape[: len(shape) // 4 * 4])
+    return after, math.prod(max(n, 0) for n in sizes)
