@@ -12,10 +12,10 @@ from soilml.config.measurement_noise import Noise
 from soilml.log_import.channels.inputs import Inputs, wheel_inputs
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.channels.wheel_quantities import Conversion, SharedError
-from soilml.log_import.checks.checked_rows import RowsToCheck
 from soilml.log_import.checks.columns import unit_remarks, with_shared_errors
 from soilml.log_import.checks.row_checks import hints_of
 from soilml.log_import.checks.sensors import dead_sensors, drop_clipped, untared_sensors
+from soilml.log_import.checks.slip_checks import RowsToCheck
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.readers import Progress
 from soilml.log_import.rows import (

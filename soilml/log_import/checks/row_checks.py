@@ -10,9 +10,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from soilml.log_import.checks.checked_rows import Hint, RowsToCheck
 from soilml.log_import.checks.slip_checks import (
     LARGEST_RADIUS,
+    Hint,
+    RowsToCheck,
     check_definition,
     check_slips,
     check_speeds,

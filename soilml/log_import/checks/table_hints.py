@@ -22,8 +22,8 @@ from soilml.fitting.usable_readings import usable_readings
 from soilml.io.read_table import ONE_RUN
 from soilml.io.table import Table
 from soilml.log_import.channels.inputs import our_slip
-from soilml.log_import.checks.checked_rows import RowsToCheck
 from soilml.log_import.checks.row_checks import hints_of
+from soilml.log_import.checks.slip_checks import RowsToCheck
 from soilml.log_import.mapping.channel_map import SLIP_DEFINITIONS
 from soilml.quantities import COLUMNS, QUANTITIES
 from soilml.remarks import Remark

@@ -14,9 +14,8 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.log_import.channels.inputs import Inputs
 from soilml.log_import.channels.wheel_quantities import Conversion
-from soilml.log_import.checks.checked_rows import RowsToCheck, other_units
 from soilml.log_import.checks.row_checks import TRACTION, hints_of
-from soilml.log_import.checks.slip_checks import FASTEST
+from soilml.log_import.checks.slip_checks import FASTEST, RowsToCheck, other_units
 from soilml.log_import.guesses.columns import Candidate
 from soilml.log_import.guesses.draft import (
     Draft,

@@ -231,15 +231,13 @@ def _take_map(settings: Settings) -> LogMap:
             "'0.15 m +- 1 %'"
         )
     named = settings.table("wheels")
-    defaults = _shared_keys(settings, named.content)
+    own_tables = _with_shared_keys(settings, named.content)
     shared = _take_channels(settings, leg is not None)
     wheels = []
     for name in named.content or ("",):
         channels, keys = shared, WheelKeys()
         if name:
-            table = named.table(name)
-            content = _with_shared_keys(table.content, defaults)
-            own = Settings(content, table.where, settings.folder)
+            own = Settings(own_tables.get(name, {}), named.table(name).where, settings.folder)
             channels = shared | _take_channels(own, leg is not None)
             keys = take_declared(WheelKeys, own, "wheel")
         gear, pattern = keys.gear or common.gear, keys.gear_from or common.gear_from
@@ -262,30 +260,23 @@ def _take_map(settings: Settings) -> LogMap:
     return found
 
 
-def _shared_keys(settings: Settings, wheels: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Tables outside of the wheels, by role, of roles that some wheel has of its own.
+def _with_shared_keys(settings: Settings, wheels: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """The tables of the wheels, with the keys of tables outside that their channels do not state.
 
-    A table that names no source of samples is taken out of `settings`: it serves the wheels only.
+    One outside that names no source of samples is taken out of `settings`: it serves wheels only.
     """
-    own = {role for wheel in wheels.values() if isinstance(wheel, dict) for role in wheel}
-    shared = {role: settings.content.get(role) for role in ROLES if role in own}
-    found = {role: content for role, content in shared.items() if isinstance(content, dict)}
-    for role, content in found.items():
-        if not {*_SOURCES} & content.keys():
+    found = {name: dict(own) for name, own in wheels.items() if isinstance(own, dict)}
+    for role in ROLES:
+        shared = settings.content.get(role)
+        users = [own for own in found.values() if isinstance(own.get(role), dict)]
+        if not users or not isinstance(shared, dict):
+            continue
+        if not {*_SOURCES} & shared.keys():
             settings.take(role, dict, f"a table [{role}]")
+        for own in users:
+            left_out = _SOURCES if {*_SOURCES} & own[role].keys() else ()
+            own[role] = {k: v for k, v in shared.items() if k not in left_out} | own[role]
     return found
-
-
-def _with_shared_keys(
-    wheel: Mapping[str, Any], shared: Mapping[str, Mapping[str, Any]]
-) -> dict[str, Any]:
-    """The table of a wheel, whose channels have the shared keys that they do not state."""
-    content = dict(wheel)
-    for role, keys in shared.items():
-        if isinstance(own := content.get(role), dict):
-            left_out = _SOURCES if {*_SOURCES} & own.keys() else ()
-            content[role] = {k: v for k, v in keys.items() if k not in left_out} | own
-    return content
 
 
 def _take_channels(settings: Settings, with_legs: bool) -> dict[str, ChannelMap]:
