@@ -8,7 +8,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from soilml.config.explanations import CaseExplanation, one_of, take_explanations
+from soilml.config.explanations import (
+    CaseExplanation,
+    one_of,
+    take_explanations,
+    with_suspects_explained,
+)
 from soilml.config.measurement_noise import (
     Discrepancy,
     Noise,
@@ -259,6 +264,7 @@ def read_case(
     wheel Prior(lower=0.4, upper=0.8, log=False) 0.02
     """
     settings = read_settings(path, f"soilml init {path}", names_files)
+    settings = Settings(with_suspects_explained(settings.content), settings.where, settings.folder)
     case = take_case(settings, effects, with_simulator)
     if with_bias:
         case = replace(case, bias=take_bias(settings.table("bias")))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from soilml.config.model_settings import Effects, changed_soil, take_effects, take_priors
 from soilml.errors import InputError
@@ -56,6 +56,25 @@ class CaseExplanation:
     def of(weight: float, case: Case) -> CaseExplanation:
         """A case as one explanation."""
         return CaseExplanation(weight, case.model, case.soil, dict(case.gears), dict(case.prior))
+
+
+def with_suspects_explained(content: dict[str, Any]) -> dict[str, Any]:
+    """The content of a model file whose effects with `suspected = true` are its only explanation.
+
+    `gap` of earlier versions marked so what predicts and is not named; [[explanation]] says it now.
+    """
+    gears = content.get("gears")
+    tables = {"": content, **(gears if isinstance(gears, dict) else {})}
+    marked, left = [], dict(content)
+    for gear, table in tables.items():
+        entries = table.get("effect", []) if isinstance(table, dict) else []
+        own = [e for e in entries if isinstance(e, dict) and e.get("suspected") is True]
+        if not own:
+            continue
+        marked += [{k: v for k, v in e.items() if k != "suspected"} | {"gear": gear} for e in own]
+        kept = dict(table) | {"effect": [e for e in entries if e not in own]}
+        left = kept if not gear else left | {"gears": left["gears"] | {gear: kept}}
+    return left | {"explanation": [{"weight": 1.0, "effect": marked}]} if marked else content
 
 
 def take_explanations(settings: Settings, effects: Effects, base: Case) -> Case:

@@ -17,10 +17,12 @@ EXCLUDED_KINDS = ("rig", "sensor")
 
 
 def mixed_forces(case: Case, of_one: Callable[[Case], Force]) -> Force:
-    """Mean forces (n,) of the explanations that have an equilibrium, by their weights."""
-    parts = [
-        (one.weight, of_one(without_faults(case.of_explanation(one)))) for one in case.explanations
-    ]
+    """Mean forces (n,) of the explanations that have an equilibrium, by their weights.
+
+    As the sensors of the rig read them: the remainder of the mixture was learned beside the faults
+    that some explanations have. A vehicle has none of them (`without_faults`).
+    """
+    parts = [(one.weight, of_one(case.of_explanation(one))) for one in case.explanations]
     answered = np.stack([np.asarray(force.status) == 0 for _, force in parts])
     weight = answered * np.asarray([w for w, _ in parts])[:, None]
     weight = weight / np.where(answered.any(axis=0), weight.sum(axis=0), 1.0)

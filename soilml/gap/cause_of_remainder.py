@@ -17,7 +17,7 @@ from soilml.inference.evidence import LinearisedFit, linear_model
 from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import Hyperparameters
 from soilml.inference.posterior import Posterior
-from soilml.inference.priors import LOG_2PI, densities_of_amplitude
+from soilml.inference.priors import densities_of_amplitude
 from soilml.numerics.prior import Prior
 from soilml.numerics.smooth_process import process_columns
 from soilml.physics.operating_point import COVARIATES
@@ -206,13 +206,11 @@ def _weighed(posterior: Posterior, node: Explanation) -> tuple[float, list[Stage
         products, constant = wide.reduced(pattern)
         constant += wide.beside(pattern, node.linear.evaluate(pattern).curvature)
         none = min(none, wide.evidence_with(products, constant, range(p), p)[0])
-        for amplitude, penalty in zip(AMPLITUDES, penalties, strict=True):
-            precision, of_prior = wide.precision.copy(), wide.constant.copy()
-            precision[p:], of_prior[p:] = amplitude**-2, 2.0 * np.log(amplitude) + LOG_2PI
-            scaled = replace(wide, precision=precision, constant=of_prior)
-            for i, one in enumerate(found):
-                own = [*range(p), *range(last[i] - one.columns.shape[1], last[i])]
-                value = scaled.evidence_with(products, constant, own, len(own))[0] + penalty
-                if value < one.value:
-                    found[i] = replace(one, value=value, at=pattern, amplitude=float(amplitude))
+        for i, (one, end) in enumerate(zip(found, last, strict=True)):
+            own = range(end - one.columns.shape[1], end)
+            values = wide.evidence_of_amplitudes(products, constant, p, own, AMPLITUDES) + penalties
+            k = int(np.argmin(values))
+            if values[k] < one.value:
+                best = float(values[k]), pattern, float(AMPLITUDES[k])
+                found[i] = replace(one, value=best[0], at=best[1], amplitude=best[2])
     return none, found

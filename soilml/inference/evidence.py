@@ -328,6 +328,32 @@ class LinearisedFit:
             )
         return value, step
 
+    def evidence_of_amplitudes(
+        self, products: Floats, constant: float, first: int, changes: Sequence[int], tried: Floats
+    ) -> Floats:
+        """Evidence (t,) with the weights of some columns at each amplitude (t,) of theirs.
+
+        products, constant: By `reduced`.
+        first: Coordinates before it are always in the model.
+        changes: Numbers of the columns, whose weights are normal about zero.
+
+        One eigenvalue problem answers for all amplitudes.
+        """
+        curvature = products[:first, :first] + np.diag(self.precision[:first])
+        curvature += self.information[:first, :first]
+        across = products[np.ix_(range(first), changes)]
+        own, b = products[np.ix_(changes, changes)], products[:first, -1] - self.pull[:first]
+        free, precision = ~self.held[:first], np.asarray(tried)[:, None] ** -2
+        step = np.linalg.solve(curvature[np.ix_(free, free)], np.column_stack([across, b])[free])
+        left, left_b = own - across[free].T @ step[:, :-1], products[changes, -1]
+        value, vector = np.linalg.eigh(left)
+        gain = (vector.T @ (left_b - across[free].T @ step[:, -1])) ** 2 / (value + precision)
+        whole = own - across.T @ np.linalg.solve(curvature, across)
+        determinants = np.log(np.linalg.eigvalsh(whole) + precision)
+        fixed = products[-1, -1] - b[free] @ step[:, -1] + np.linalg.slogdet(curvature)[1]
+        fixed += constant - first * LOG_2PI + self.cost + self.constant[:first].sum()
+        return np.asarray(fixed + (determinants - np.log(precision) - gain).sum(axis=1))
+
 
 def linear_model(
     terms: GaussianTerms,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -63,6 +63,7 @@ class Posterior:
     """
 
     search: Search
+    _drawn: dict[tuple[int, int], list[Draws]] = field(default_factory=dict)
 
     @property
     def problem(self) -> InferenceProblem:
@@ -297,6 +298,8 @@ class Posterior:
 
         References: Geweke, Econometrica 57, 1989 (importance sampling from widened proposals).
         """
+        if (seed, count) in self._drawn:
+            return self._drawn[seed, count]
         rng = np.random.default_rng(seed)
         proposed = [
             own for one in self.components() for own in proposals(one, self.terms, count, rng)
@@ -306,6 +309,7 @@ class Posterior:
             fit = own.node.fit
             near = replace(fit.linearisation.sinkage_at(own.x), nearest=True)
             found.append(weighted(own, self.terms, fit.problem.predict(own.x, near)))
+        self._drawn[seed, count] = found
         return found
 
     def beside(self, fixed: Floats, inner: Sequence[Floats] = ()) -> Posterior:

@@ -15,7 +15,9 @@ _SPELLINGS = {
     "mnm": "mN*m", "mn-m": "mN*m", "mn.m": "mN*m", "ncm": "N*cm", "n-cm": "N*cm", "n.cm": "N*cm",
     "knm": "kN*m", "nmm": "N*mm", "n-mm": "N*mm", "n.mm": "N*mm", "unm": "uN*m",
     "lb-ft": "lbf*ft", "ft-lb": "lbf*ft", "lbft": "lbf*ft", "ftlb": "lbf*ft", "in-lb": "lbf*inch",
-    "lb-in": "lbf*inch", "lbs": "lbf", "kgf": "kgf", "kp": "kgf", "gf": "kgf/1000",
+    "lb-in": "lbf*inch", "lbf_ft": "lbf*ft", "lbf_in": "lbf*inch", "ft_lbf": "lbf*ft", "n_m": "N*m",
+    "n_cm": "N*cm", "n_mm": "N*mm", "in": "inch", "lbs": "lbf",
+    "kgf": "kgf", "kp": "kgf", "gf": "kgf/1000",
     "kgfcm": "kgf*cm", "kgf-cm": "kgf*cm", "kg-cm": "kgf*cm", "kgcm": "kgf*cm", "kgm": "kgf*m",
     "kgfm": "kgf*m", "kgf-m": "kgf*m",
     "oz in": "force_ounce*inch", "oz-in": "force_ounce*inch",
@@ -52,7 +54,8 @@ _EXACT = {"mNm": "mN*m", "MNm": "MN*m", "Nm": "N*m", "kNm": "kN*m", "G": "g_0", 
 _SUFFIXES = (
     "deg_s rad_s m_s mm_s cm_s m_s2 counts ticks rpm mnm nm rad deg degs mm cm ma ms us ns sec "
     "secs percent pct kgf mps mmps rps dps radps n m a s kg kn turns rev v lbf degps ncm newton "
-    "newtons amps inc mn mm_min cm_min m_min mv uv pa kpa mpa psi nmm"
+    "newtons amps inc mn mm_min cm_min m_min mv uv pa kpa mpa psi nmm kmh kph km_h mph ft_s in_s "
+    "ft n_m n_cm n_mm lbf_ft lbf_in ft_lbf"
 )
 #: Per cent of something that a data sheet states.
 _SHARE = re.compile(
@@ -95,12 +98,16 @@ def spelling(unit: str) -> str:
 
 def unit_in_name(name: str) -> str:
     """The unit that ends a name such as torque_Nm, v_mm_s or current_mA; "" without one."""
-    words = re.split(r"[_\s.\-]+", name)
+    words = [word for word in re.split(r"[_\s.\-]+", name) if word.lower() != "per"]
     for count in (2, 1):
         tail = words[-count:]
+        if count == 2 and tail[-1].lower() in ("sec", "second"):
+            tail[-1] = "s"
         if len(words) > count and "_".join(tail).lower() in _SUFFIXES.split():
             text = (
-                "/".join(tail) if count == 2 and tail[-1] in ("s", "s2", "min") else "_".join(tail)
+                "/".join(tail)
+                if count == 2 and tail[-1] in ("s", "s2", "min", "h")
+                else "_".join(tail)
             )
             if len(text) == 1 and text.islower() and text in ("a", "n", "v"):
                 continue  # an axis or an index rather than a unit

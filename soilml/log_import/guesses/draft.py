@@ -203,14 +203,22 @@ def put_zero_of_sinkage(drafts: dict[str, Draft], inputs: Inputs, radius: float)
     """Tare a sinkage that is the distance of a sensor to the ground, or a place on a scale.
 
     That is one that is far, or a large share of the `radius` (m, 0 where unknown), or that falls as
-    the wheel drives. Where it might be, a comment says so.
+    the wheel drives. Where it might be, a comment says so; of a wheel that never rests, a mark.
     """
     rest = inputs.rest.get("sinkage", (math.nan, 0.0))[0]
-    if "sinkage" not in drafts or "sinkage" not in inputs.values or not math.isfinite(rest):
+    if "sinkage" not in drafts or "sinkage" not in inputs.values:
         return
     draft, shown = drafts["sinkage"], f"it reads {1e3 * abs(rest):.3g} mm"
     level = float(np.nanmedian(inputs.values["sinkage"][moving(inputs)]))
     far = min(_FAR, _MOST_AT_REST * radius) if radius > 0.0 else _FAR
+    if not math.isfinite(rest):
+        falls = correlation(driving_means(inputs), "sinkage", "torque") < -0.5
+        if says(draft.column.name, _HEIGHTS) or abs(level) > far or falls:
+            draft.comments["column"] = Marked(
+                f"CHANGE: it reads {1e3 * level:.3g} mm as the wheel drives, and no rest shows "
+                "where the surface is; a distance to it falls as the wheel sinks (reverse = true)"
+            )
+        return
     falls = abs(level) < abs(rest) - _NOISE
     if abs(rest) < far and abs(level) < _FAR and not falls:
         add = 'add tare = "rest" and bias = 0.01'

@@ -96,6 +96,13 @@ name = "bulldozing"
             case_of(tmp_path, GEARS + REST + several.replace("weight = 0.6", wrong))
 
 
+def test_a_suspected_effect_of_an_earlier_file_is_its_only_explanation(tmp_path):
+    marked = (GEARS + REST).replace("n1 = 0.3", "suspected = true\nn1 = 0.3")
+    case = case_of(tmp_path, marked, with_explanations=True)
+    assert case.model.effects == () and [e.weight for e in case.explanations] == [1.0]
+    assert [e.name for e in case_of(tmp_path, marked).model.effects] == ["slip-sinkage"]
+
+
 def test_parameters_of_gears_are_set_by_path(tmp_path):
     case = case_of(tmp_path, GEARS + REST)
     new = {"gears.smooth.radius": 0.2, "grousers@lugged.height": 0.015, "slip-sinkage.n1": 0.1}

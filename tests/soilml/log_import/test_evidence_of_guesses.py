@@ -324,3 +324,18 @@ def test_what_was_computed_shares_its_error(tmp_path, capsys):
     assert "[load] is a constant or follows from the slope" in said
     bias = tomllib.loads((tmp_path / "runs.bias.toml").read_text())["bias"]
     assert bias["torque_Nm"] == "10 %" and bias["load_N"] == "2 %"
+
+
+def test_units_at_the_end_of_names_and_a_distance_without_a_rest(tmp_path):
+    d = drive(np.random.default_rng(3), (0.1, 0.3, 0.5), [60] * 3, rate=20)
+    turns = d.omega > 0.05
+    own = {"time_s": d.t, "omega_deg_per_sec": np.rad2deg(d.omega), "v_ft_s": d.v / 0.3048,
+           "torque_N_m": d.torque, "total_load_lbf": d.load / 1.1,
+           "laser_mm": 400.0 - 1e3 * d.sinkage}  # fmt: skip
+    log = write(tmp_path / "log.csv", {name: values[turns] for name, values in own.items()})
+    text = init(tmp_path, [log])
+    found = tomllib.loads(text)
+    units = {role: found[role]["unit"] for role in ("wheel_speed", "ground_speed", "torque")}
+    assert units == {"wheel_speed": "deg/s", "ground_speed": "ft/s", "torque": "N_m"}
+    assert silent(text).keys() == {"wheel_speed", "ground_speed"}
+    assert "no rest shows where the surface is" in text and "its name is of a whole" in text

@@ -9,6 +9,7 @@ from soilml import Model, SlipSinkage, Wheel, soil
 from soilml.config.case import Case
 from soilml.config.explanations import CaseExplanation
 from soilml.config.measurement_noise import Noise
+from soilml.fitting.mixtures import without_faults
 from soilml.fitting.simulation import simulate
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
@@ -64,9 +65,12 @@ def test_the_error_fades_to_zero_mean_and_a_usual_size_in_every_direction(drawn)
     assert (np.abs(mean[1:]) < 0.2 * std[1:]).all()
 
 
-def test_a_mixture_predicts_the_mean_of_its_explanations_without_faults_of_sensors():
+def test_a_mixture_predicts_the_mean_reading_of_its_explanations_and_their_sensors():
     slip = np.asarray([0.1, 0.4])
-    mixed, digging, plain = (
-        simulate(case, slip, 60.0)["drawbar_pull_N"] for case in (MIXED, DIGGING, PLAIN)
+    mixed, digging, off = (
+        simulate(case, slip, 60.0)["drawbar_pull_N"] for case in (MIXED, DIGGING, OFF)
     )
-    np.testing.assert_allclose(mixed, (0.6 * digging + 0.3 * plain) / 0.9, rtol=1e-12)
+    np.testing.assert_allclose(mixed, (0.6 * digging + 0.3 * off) / 0.9, rtol=1e-12)
+    no_effect = replace(MIXED, explanations=(CaseExplanation.of(1.0, PLAIN),))
+    on_vehicle = simulate(without_faults(OFF), slip, 60.0)["drawbar_pull_N"]
+    np.testing.assert_array_equal(simulate(no_effect, slip, 60.0)["drawbar_pull_N"], on_vehicle)
