@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,10 @@ from soilml.remarks import Remark
 #: Bytes from which a log is read by pyarrow, and by which the layout of such a log is found.
 SMALLEST, _HEAD = 1 << 18, 1 << 15
 _NUMBERS = 0.5  # Share of the cells of a column that must be numbers
+#: Tables of readings, as exports of CAN: most signals, fewest readings of each, and the share of
+#: the lines at which the name changes, which runs and states do seldom.
+_MOST_SIGNALS, _FEWEST, _CHANGES = 200, 8, 0.2
+_UNITS = ("unit", "units", "einheit", "unidad", "unité", "单位")
 #: A mark between thousands that is no decimal mark: a hard or thin space, an apostrophe.
 _MARKS = "\u00a0\u202f\u2009'\u2019"
 _GROUPED = re.compile(rf"(?<=\d)[{_MARKS}](?=\d{{3}}(?!\d))", re.ASCII)
@@ -31,7 +37,7 @@ _GROUPED = re.compile(rf"(?<=\d)[{_MARKS}](?=\d{{3}}(?!\d))", re.ASCII)
 def read_delimited_text(
     path: Path, progress: Callable[[int], None] | None = None
 ) -> list[Recording]:
-    """The table of a text log.
+    """The table of a text log, or a recording for each signal of one with a line a reading.
 
     Encoding, separator, decimal mark, header, line of units and the first sample are found. Cells
     that are not a number count as missing. Lines with a wrong number of cells are left out.
@@ -42,7 +48,7 @@ def read_delimited_text(
     """
     size = path.stat().st_size
     if size >= SMALLEST and (plain := _plain_recording(path, progress)) is not None:
-        return [plain]
+        return signals_of(plain)
     LOG_BYTES.check(path, size)
     text, encoding = decode_text(path.read_bytes(), path)
     if any(mark in text for mark in _MARKS):
@@ -89,7 +95,7 @@ def _recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) ->
             columns[name] = values
         else:
             texts[name] = [cell.strip().strip('"') for cell in cells]
-    return [_recorded(path, layout, columns, texts, found, bad)]
+    return signals_of(_recorded(path, layout, columns, texts, found, bad))
 
 
 def _rows(lines: Sequence[str], layout: TextLayout) -> tuple[list[list[str]], int]:
@@ -197,3 +203,46 @@ def _plain_recording(path: Path, progress: Callable[[int], None] | None) -> Reco
     texts = {name: [cell.strip() for cell in whole.pop(name)] for name in of_text}
     columns = {name: cells.astype(np.float64) for name, cells in whole.items()}
     return _recorded(path, layout, columns, texts, notes, bad)
+
+
+def signals_of(recording: Recording) -> list[Recording]:
+    """A recording for each signal of a table of readings; the table itself where it is none.
+
+    Such a table has a text that changes from line to line, one column of numbers beside the time,
+    and perhaps the unit as text.
+    """
+    texts = recording.texts
+    signals = [n for n in texts if n.lower() not in _UNITS and _is_signal(texts[n])]
+    numbers = [name for name, own in recording.columns.items() if np.isfinite(own).any()]
+    clocks = [name for name in numbers if _rises(recording, name)]
+    if not signals or len(numbers) != 2 or len(clocks) != 1:
+        return [recording]
+    signal, (clock,) = max(signals, key=lambda n: len({*texts[n]})), clocks
+    (value,) = (name for name in numbers if name != clock)
+    of_unit = next((name for name in texts if name.lower() in _UNITS), "")
+    said = Remark("long-table", f"each line is one reading of {signal!r}", (signal,), "note")
+    cells, known = np.asarray(texts[signal]), np.isfinite(recording.columns[clock])
+    found = []
+    for name in dict.fromkeys(texts[signal]):
+        own = recording.rows((cells == name) & known)
+        columns = {clock: own.columns[clock], name: own.columns[value]}
+        units = {clock: recording.units.get(clock, "")}
+        units[name] = own.texts[of_unit][0] if of_unit else ""
+        notes = (*recording.notes, said)
+        found.append(Recording("", own.file, columns, {}, units, about=own.about, notes=notes))
+    return found
+
+
+def _is_signal(cells: list[str]) -> bool:
+    """Whether a text (n,) is a few names that take turns."""
+    counts = Counter(cells)
+    if not 1 < len(counts) <= _MOST_SIGNALS or min(counts.values()) < _FEWEST or "" in counts:
+        return False
+    return sum(a != b for a, b in pairwise(cells)) > _CHANGES * len(cells)
+
+
+def _rises(recording: Recording, name: str) -> bool:
+    values = recording.columns[name]
+    values = values[np.isfinite(values)]
+    # compared, not subtracted: differences of huge numbers overflow
+    return values.size > 1 and bool(np.all(values[1:] >= values[:-1])) and values[-1] > values[0]

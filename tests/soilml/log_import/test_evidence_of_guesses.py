@@ -154,6 +154,19 @@ def test_counts_of_a_converter_ask_for_the_calibration(tmp_path):
     assert 'scale = "1 N m"  # CHANGE: what 1 count is' in text and "torque" not in silent(text)
 
 
+def test_a_line_for_each_reading_of_a_bus(tmp_path):
+    """Time, signal, value and unit, as exports of CAN have them."""
+    d = drive(np.random.default_rng(8), (0.1, 0.3, 0.5), [60] * 3, rate=20)
+    signals = {"WheelSpeed": ("rad/s", d.omega), "VehicleSpeed": ("km/h", 3.6 * d.v),
+               "WheelTorque": ("Nm", d.torque), "WheelLoad": ("N", d.load)}  # fmt: skip
+    lines = [f"{t:.3f},{name},{values[i]:.5f},{unit}" for i, t in enumerate(d.t)
+             for name, (unit, values) in signals.items()]  # fmt: skip
+    (tmp_path / "can.csv").write_text("\n".join(["Timestamp,Signal,Value,Unit", *lines]))
+    text = init(tmp_path, [tmp_path / "can.csv"])
+    assert silent(text) == {"wheel_speed": "WheelSpeed", "ground_speed": "VehicleSpeed",
+                            "torque": "WheelTorque", "load": "WheelLoad"}  # fmt: skip
+
+
 def test_a_load_far_from_the_stated_mass_is_marked(tmp_path):
     log, _ = log_of(tmp_path)
     log.write_text("# rover mass: 12 kg, 6 wheels\n" + log.read_text())
