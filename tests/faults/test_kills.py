@@ -1,8 +1,8 @@
 """Commands that are killed at random moments: outputs are whole, and a rerun makes them anew.
 
 After a kill every output that is there is whole; after the rerun the outputs are those of an
-undisturbed run, bit for bit, beside hidden temporary files at most. `make faults FAULT_KILLS=30`
-kills each command so often.
+undisturbed run, bit for bit, and nothing else lies beside them. `make faults FAULT_KILLS=30` kills
+each command so often.
 """
 
 import hashlib
@@ -69,11 +69,6 @@ def digests(folder):
     }
 
 
-def visible(folder):
-    """The digests of files that are no temporary ones, which SIGKILL may leave."""
-    return {k: own for k, own in digests(folder).items() if not Path(k).name.startswith(".")}
-
-
 def completed(folder, words):
     """Run to the end; the seconds that it took."""
     begun = time.monotonic()
@@ -130,9 +125,10 @@ def test_a_rerun_after_a_kill_is_as_if_nothing_had_happened(folder, command, sub
         out.mkdir()
         with subtests.test(f"{number.name} after {delay:.2f} s"):
             assert not killed(folder, words, delay, number)
-            left, whole = digests(out), visible(out)
+            left = digests(out)
+            whole = {name: own for name, own in left.items() if not Path(name).name.startswith(".")}
             assert whole.items() <= right.items()
             assert number == signal.SIGKILL or whole == left
             time.sleep(0.2 if number == signal.SIGKILL else 0.0)  # workers end with their parent
             completed(folder, words)
-            assert visible(out) == right
+            assert digests(out) == right
