@@ -11,7 +11,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.quantities import QUANTITIES
-from soilml.report.numbers import format_log_density, pretty, shown_column
+from soilml.report.numbers import pretty, shown_column
 from soilml.report.page import json_text
 from soilml.report.report import Picture, Report
 from soilml.report.tables import Column, ReportTable
@@ -23,7 +23,7 @@ FILES = ("map.tif", "costmap.yaml", "costmap.pgm", "map.json", "map.png")
 
 
 def report_of_map(found: SoilMap) -> Report:
-    """The report of a map: where the soil changes, the soil of each patch, slopes, the score."""
+    """The report of a map: where the soil changes, the soil of each patch, slopes."""
     drive, soils = found.drive, found.soils
     span = drive.station.max() - drive.station.min()
     changes = ", ".join(f"{s:.1f}" for s in found.changes)
@@ -35,12 +35,6 @@ def report_of_map(found: SoilMap) -> Report:
         if found.field.local > 0.05 and np.isfinite(found.field.length)
         else "Within a patch no variation is found."
     ]
-    if (held := found.held_out) is not None:
-        gains = [
-            f"{format_log_density(*held.gain(name))} above {name}"
-            for name in ("tracker", "one soil")
-        ]
-        lines.append(f"Log density of the torque of rows held out: {', '.join(gains)}.")
     wheels = len(np.unique(drive.wheel))
     return Report(
         kind="map",
@@ -99,7 +93,7 @@ def _slopes(found: SoilMap) -> ReportTable:
 
 
 def map_json(found: SoilMap) -> dict[str, Any]:
-    """Stretches, changes, the settings of the field by weight, score and remarks."""
+    """Stretches, changes, the settings of the field by weight, and remarks."""
     soils, field = found.soils, found.field
     score, covariance = field.at(soils.place)
     mean, std = parameter_moments(soils, score, covariance)
@@ -119,12 +113,8 @@ def map_json(found: SoilMap) -> dict[str, Any]:
         "cell_m": found.grid.cell,
         "cells": int(found.known.sum()),
         "stretches": {name: np.asarray(values).tolist() for name, values in stretches.items()},
-        "held_out": None
-        if found.held_out is None
-        else {"rows": found.held_out.rows, "log_density": found.held_out.mean,
-              "gain": {n: found.held_out.gain(n) for n in ("tracker", "one soil")}},
         "remarks": [remark.as_json() for remark in found.remarks()],
-    }  # fmt: skip
+    }
 
 
 def map_files(

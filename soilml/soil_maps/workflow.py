@@ -20,7 +20,6 @@ from soilml.quantities import NOT_IDENTIFIED_ABOVE, QUANTITIES
 from soilml.remarks import Remark
 from soilml.results import Result
 from soilml.soil_maps.field import MapAbility, SoilField, map_ability
-from soilml.soil_maps.held_out import HeldOutScore, held_out_score
 from soilml.soil_maps.local_soils import (
     FollowedRows,
     LocalSoils,
@@ -29,7 +28,6 @@ from soilml.soil_maps.local_soils import (
     local_soils,
     read_map_drive,
     soil_values,
-    with_exact_sensors,
 )
 from soilml.soil_maps.raster import MapGrid
 from soilml.traction.vehicle import DrivenVehicle
@@ -55,7 +53,6 @@ class SoilMap(Result):
     score, covariance: Normal scores of the soil in the k cells that are known, (k, p) and (k, p,
         p).
     ability: The rover straight up slopes; None for a model file without [rover].
-    held_out: How well stretches are predicted that were left out; None for a short drive.
     notes: Remarks on model file and trained file.
     """
 
@@ -68,7 +65,6 @@ class SoilMap(Result):
     score: Floats
     covariance: Floats
     ability: MapAbility | None
-    held_out: HeldOutScore | None
     notes: tuple[Remark, ...] = ()
 
     @cached_property
@@ -108,7 +104,7 @@ class SoilMap(Result):
         return found
 
     def report(self) -> Report:
-        """Where the soil changes, the soil of each patch, slopes, and how well it predicts."""
+        """Where the soil changes, the soil of each patch, and slopes."""
         from soilml.soil_maps.presentation import report_of_map
 
         return report_of_map(self)
@@ -138,15 +134,6 @@ class SoilMap(Result):
             yield Remark("not-determined", text, tuple(vague))
         if self.ability is None:
             yield Remark("no-rover", "the model file has no [rover]: soil alone, no slopes")
-        if self.held_out is None:
-            text = "too few stretches to hold some out: how well it predicts is not known"
-            yield Remark("no-score", text)
-        else:
-            for name in ("tracker", "one soil"):
-                gain, error = self.held_out.gain(name)
-                if gain < -2.0 * error:
-                    text = f"on stretches held out, {name} predicts better: do not use the map"
-                    yield Remark("worse-than-simple", text, (name,))
 
 
 def soil_map(
@@ -157,7 +144,6 @@ def soil_map(
     cell: float = CELL,
     reach: float = REACH,
     slopes: Floats | Sequence[float] = SLOPES,
-    score: bool = True,
     progress: Progress | None = None,
 ) -> SoilMap:
     """A map of the soil from the rows of a drive with positions.
@@ -175,8 +161,6 @@ def soil_map(
         Side of a cell, and how far from a reading the soil is said to be known, m.
     slopes
         Rising slopes that the rover is to climb, rad.
-    score
-        Whether stretches are held out to see how well the map predicts them.
     progress
         Function of the stage, of what is done, and of all of it.
 
@@ -206,8 +190,9 @@ def soil_map(
     own = Estimator.load(MODEL) if estimator is None else estimator
     if own.sets is None:
         raise InputError(f"{own.path} has no set posterior; train it with [set_posterior]")
-    alone = case.without_explanations()
-    (own,), notes = estimators_for_case([own], alone, "the model file", pooled=True)
+    (own,), notes = estimators_for_case(
+        [own], case.without_explanations(), "the model file", pooled=True
+    )
     if case.explanations:
         text = (
             "the rover has the effects of each [[explanation]] as likely as it is; the soil is "
@@ -232,23 +217,8 @@ def soil_map(
     ability = None
     if case.rover is not None:
         ability = map_ability(case, soils, mean, covariance, asked)
-    held_out = None
-    if score:
-        tell("predicting stretches held out", 0, 1)
-        held_out = held_out_score(alone, with_exact_sensors(own), drive, followed, soils)
-        tell("predicting stretches held out", 1, 1)
     return SoilMap(
-        drive,
-        followed,
-        soils,
-        field,
-        grid,
-        known,
-        mean,
-        covariance,
-        ability,
-        held_out,
-        tuple(notes),
+        drive, followed, soils, field, grid, known, mean, covariance, ability, tuple(notes)
     )
 
 
