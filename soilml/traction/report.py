@@ -62,10 +62,13 @@ class PullReport(Result):
         ]
 
     def frame_columns(self) -> dict[str, Any]:
-        """Medians and ends of 90 % bands, SI units: a row for each load and slip, or each slope."""
+        """Medians and ends of 90 % bands, SI units: a row for each slope of a rover.
+
+        Of a wheel: a row for each load and slip, with what it does on each slope in all of a load.
+        """
         if self.of_rover:
             return _slope_columns(self.by_load[0])
-        return _of_loads(self.by_load, _curve_columns)
+        return _of_loads(self.by_load, _curve_columns) | _of_loads(self.by_load, _on_each_slope)
 
     def report(self, title: str = "Drawbar pull and slopes") -> Report:
         """Largest pull and steepest slope, curves and slopes, and what limits them."""
@@ -176,16 +179,14 @@ def _curve_columns(one: TractionPrediction) -> dict[str, Any]:
         ("sinkage_m", known.deepest),
         ("largest_drawbar_pull_N", known.largest_pull),
         ("strongest_slip", known.strongest_slip),
+        ("best_slip", known.best_slip),
+        ("best_efficiency", known.best_efficiency),
         ("steepest_slope_rad", known.steepest_slope),
+        ("drawbar_pull_N_prior", prior.pull),
+        ("largest_drawbar_pull_N_prior", prior.largest_pull),
+        ("steepest_slope_rad_prior", prior.steepest_slope),
     ):
         columns |= {k: np.broadcast_to(v, count) for k, v in band_columns(name, values).items()}
-    for name, values in (
-        ("drawbar_pull_N", prior.pull),
-        ("steepest_slope_rad", prior.steepest_slope),
-    ):
-        band = quantile_band(values)
-        columns[f"{name}_prior_p05"] = np.broadcast_to(band.lower, count)
-        columns[f"{name}_prior_p95"] = np.broadcast_to(band.upper, count)
     for name, share in zip(
         ("largest_drawbar_pull", "steepest_slope"), one.remaining_fraction, strict=True
     ):
@@ -208,6 +209,18 @@ def _slope_columns(one: TractionPrediction) -> dict[str, Any]:
         columns[f"load_N_{name}"] = own.loads[name]
         columns[f"torque_Nm_{name}"] = quantile_band(own.torque[name]).middle
         columns[f"sinkage_m_{name}"] = quantile_band(own.sinkage[name]).middle
+    return columns
+
+
+def _on_each_slope(one: TractionPrediction) -> dict[str, Any]:
+    """The columns of slopes as one for each slope, alike for all slips."""
+    own, count = _slope_columns(one), len(one.posterior.curve_slip)
+    columns = {}
+    for i, slope in enumerate(np.rad2deg(own.pop("slope_rad"))):
+        for name, values in own.items():
+            if not name.startswith("steepest_slope"):
+                start, ending, end = name.partition("_p05" if name.endswith("_p05") else "_p95")
+                columns[f"{start}_at_{slope:g}_deg{ending}{end}"] = np.full(count, values[i])
     return columns
 
 

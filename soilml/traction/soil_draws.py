@@ -121,7 +121,7 @@ def measured_soil(
     learned_before, case = case.remainder, case.without_learned_discrepancy()
     case = case.without_remainder_of(table)
     unknown = select_free(case, free)
-    readings = usable_readings(case, table)
+    readings = usable_readings(case, table).thinned()
     check_declared(readings)
     found = posterior_draws_of(case, readings, unknown, DRAWS)
     warnings = [*([DRAWN_WITHOUT] if case.remainder is not learned_before else []), *readings.notes]
@@ -138,23 +138,24 @@ def measured_soil(
 def _exact_soil(case: Case, table: Table, free: Sequence[str] | None) -> MeasuredSoil:
     """The soil with model and sensors exactly as the case has them."""
     case = one_of(case, "the case")
-    unknown, whole = select_free(case, free), usable_readings(case, table)
-    check_declared(whole)
-    part = whole.thinned()
-    samples = posterior_samples(case, part, unknown)
+    unknown, readings = select_free(case, free), usable_readings(case, table).thinned()
+    check_declared(readings)
+    samples = posterior_samples(case, readings, unknown)
     x = samples.sample.u[samples.equally_weighted(DRAWS)]
-    warnings = [*part.notes]
+    warnings = [*readings.notes]
     if samples.rejected:
         consequence = "bands are widened and may be biased"
         warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
-    residual = np.nan_to_num(whole.measured - predict(case, unknown, x, whole))
-    none = np.zeros((len(whole), 0))
+    residual = np.nan_to_num(readings.measured - predict(case, unknown, x, readings))
+    none = np.zeros((len(readings), 0))
     left = LeftByDraws(
-        np.arange(DRAWS), _stated_sizes(case, whole), residual,
-        Whitening(1.0 / whole.std, none, np.zeros(0)),
+        np.arange(DRAWS), _stated_sizes(case, readings), residual,
+        Whitening(1.0 / readings.std, none, np.zeros(0)),
     )  # fmt: skip
     draws = _soil_draws(unknown, x)
-    return MeasuredSoil(case, draws, unknown, tuple(warnings), whole, [left], samples.noise_scale)
+    return MeasuredSoil(
+        case, draws, unknown, tuple(warnings), readings, [left], samples.noise_scale
+    )
 
 
 def _stated_sizes(case: Case, readings: Readings) -> dict[str, tuple[float, float]]:

@@ -40,8 +40,8 @@ names one wheel.
 changes with it is disputed: by default the law is open, and in the bands.
 
 p05 and p95 are the ends of the 90 % band; `prior` is the band before any
-measurement. The CSV file has a row for each load and slip, of a rover for each
-slope, in SI units.
+measurement. The CSV file has a row for each load and slip, with columns for
+each slope; of a rover a row for each slope. All are in SI units.
 """
 MAX_LOADS = 8  # Largest number of loads
 ARGUMENTS = (
@@ -135,6 +135,8 @@ def _write_results(
         report = replace(reports[""], title=title)
     else:
         verdict = f"{len(found)} groups of rows have a prediction."
+        if len(found) == 1:
+            verdict = "One group of rows has a prediction."
         report = by_group(reports, failed, args.by, verdict, title)
     content = {
         "columns": {name: values.tolist() for name, values in columns.items()},

@@ -42,3 +42,11 @@ def test_rows_that_speak_against_the_model_are_said_beside_its_bands(case):
         rows.columns["run"] = np.repeat(["a", "b"], 3)
         soil = measured_soil(case, rows)
         assert ("against-model" in {w.code for w in soil.warnings}) == digging
+
+
+@pytest.mark.parametrize("exact_model", [False, True])
+def test_many_rows_are_thinned_as_by_identify(case, monkeypatch, exact_model):
+    monkeypatch.setattr("soilml.fitting.readings.MOST_FITTED_ROWS", 4)
+    rows = torque_rows(case, {}, np.tile([0.1, 0.3, 0.5], 2), np.repeat([40.0, 90.0], 3))
+    soil = measured_soil(case, rows, exact_model=exact_model)
+    assert soil.readings.row_count == 4 and "rows-thinned" in {w.code for w in soil.warnings}
