@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,22 +20,21 @@ from soilml.experiment_design.expected_variance import (
     predicted_readings,
 )
 from soilml.experiment_design.parameter_samples import ParameterSamples
-from soilml.fitting.levels import replicate_rows
 from soilml.physics.operating_point import MOST_SLIP, Operating
-from soilml.quantities import column
+from soilml.quantities import NOT_IDENTIFIED_ABOVE, column
 from soilml.remarks import Remark
+from soilml.report.numbers import parameter_name, share_left
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
-
-if TYPE_CHECKING:
-    from soilml.report.report import Report
 
 #: Default slips, and the number of default loads.
 SLIPS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 LOADS = 5
 #: Default loads run from this multiple of the smallest measured to this of the largest.
 LIGHTER, HEAVIER = 0.5, 2.0
-#: Most operating points whose repetition is rated.
-REPETITIONS = 6
+#: Most grid points that are labelled with their value in a map, and most ticks of an axis.
+MOST_LABELS, TICKS = 80, 8
 MOST_POINTS = 1000  # Most operating points of a grid
 Floats32 = NDArray[np.float32]
 NO_ROWS = np.zeros((1, 1), np.float32)  # Log likelihood of no rows
@@ -107,22 +107,6 @@ def channel_sets(declared: Sequence[str]) -> list[tuple[str, ...]]:
     return [(first,), *[(first, other) for other in others]]
 
 
-def repeated_points(measured: Operating, channels: tuple[str, ...] = ()) -> list[CandidateRow]:
-    """The operating points of rows (n,), each once; of many, `REPETITIONS` spread over all.
-
-    The point of replicate rows is their median.
-    """
-    slip, load = np.atleast_1d(measured.slip), np.atleast_1d(measured.load)
-    group = replicate_rows(Operating(slip=slip, load=load))
-    ends = np.cumsum(np.unique(group, return_counts=True)[1])
-    members = np.split(np.argsort(group, kind="stable"), ends[:-1])
-    points = sorted((float(np.median(slip[i])), float(np.median(load[i]))) for i in members)
-    if len(points) > REPETITIONS:
-        kept = np.linspace(0, len(points) - 1, REPETITIONS).round().astype(int)
-        points = [points[i] for i in kept]
-    return [CandidateRow(*point, channels=channels) for point in points]
-
-
 @dataclass(frozen=True)
 class RatedRow:
     """A candidate row and the fraction of each prior's width expected to remain after it, (p,).
@@ -151,8 +135,6 @@ class Advice(Result):
         Fraction (p,) of each prior's width that remains before the next measurement.
     choices
         All candidates at which the wheel can be driven.
-    repetitions
-        Rows that repeat measured operating points.
     sequence
         The best first row, the best second one after it, and so on; their fractions are those after
         all rows so far.
@@ -167,7 +149,6 @@ class Advice(Result):
     names: tuple[str, ...]
     current_fraction: Floats
     choices: tuple[RatedRow, ...]
-    repetitions: tuple[RatedRow, ...]
     sequence: tuple[RatedRow, ...]
     excluded_points: int
     measured: Operating | None = None
@@ -186,15 +167,34 @@ class Advice(Result):
         """The choice with the least remaining fraction of one parameter, or of all (`overall`)."""
         return best_row(self.with_channels(channels or self.channel_sets[0]), self.names, name)
 
-    def best_repetition(self, name: str | None = None) -> RatedRow | None:
-        """The best repetition of a measured operating point; None without measured rows."""
-        return best_row(self.repetitions, self.names, name) if self.repetitions else None
-
     def report(self) -> Report:
         """The best next rows, and maps of what each row would leave."""
-        from soilml.experiment_design.presentation import report_of_advice
-
-        return report_of_advice(self)
+        columns = []
+        for name, values in self.best_columns().items():
+            if name.endswith("_left"):
+                symbol = parameter_name(name.removesuffix("_left")).split()[-1]
+                columns.append(Column(f"{symbol} left", values.tolist(), "share", digits=2))
+            elif name != "channels":
+                unit = "N" if name == "load_N" else "1"
+                columns.append(Column(name.removesuffix("_N"), list(values), unit, digits=3))
+        verdict, count = f"Measure next: {_row_text(self, self.best())}.", len(self.names)
+        vague = _vague(self)
+        return Report(
+            kind="plan",
+            verdict=verdict,
+            lines=[] if self.measured is None else list(_lines(self)),
+            tables=[ReportTable("Rows to measure next", columns, "Width left of each prior.")],
+            pictures=[
+                Picture(
+                    "Next rows", partial(_draw_maps, self), 1, count, (3.8 * count, 3.6), verdict,
+                    "Expected width, in percent of the prior's, after a row at this slip and load. "
+                    "Frame: the best row. Rings: measured rows. Blank: soils may not carry it.",
+                )
+            ],
+            remarks=self.remarks,
+            status=f"{len(vague)} of {count} open" if vague else "identified",
+            title="Measurement to make next",
+        )  # fmt: skip
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each candidate, the best first, with the fractions that it leaves."""
@@ -208,8 +208,6 @@ class Advice(Result):
             (f"best in all with {own[1]}", self.best(None, own)) for own in self.channel_sets[1:]
         ]
         rows += [(f"best for {name}", self.best(name)) for name in self.names]
-        if (repeat := self.best_repetition()) is not None:
-            rows.append(("best repeat", repeat))
         if (count := len(self.sequence)) > 1:
             rows += [(f"row {i} of {count}", c) for i, c in enumerate(self.sequence, 1)]
         return self._columns(rows)
@@ -241,7 +239,6 @@ def rate_rows(
     samples: ParameterSamples,
     grid: CandidateGrid,
     *,
-    measured: Operating | None = None,
     count: int = 1,
     covariates: Mapping[str, float] | None = None,
     outcome_count: int = OUTCOMES,
@@ -260,8 +257,6 @@ def rate_rows(
         What is known of the parameters: samples of the prior, or of a posterior.
     grid
         Slips and loads (N) that can be driven.
-    measured
-        Operating points of earlier rows, whose repetition is rated for comparison.
     count
         Length of the sequence.
     covariates
@@ -281,9 +276,7 @@ def rate_rows(
     Chaloner and Verdinelli, Statistical Science 10, 1995.
     """
     points = [(c.slip, c.load) for c in grid.candidates([()])]
-    if measured is not None:
-        points += [(c.slip, c.load) for c in repeated_points(measured)]
-    index = {point: k for k, point in enumerate(dict.fromkeys(points))}
+    index = {point: k for k, point in enumerate(points)}
     slip, load = np.asarray(list(index)).T
     others = {key: np.full(len(index), value) for key, value in (covariates or {}).items()}
     ahead = predicted_readings(case, samples, Operating(slip=slip, load=load, **others))
@@ -320,13 +313,69 @@ def rate_rows(
         own = outcomes.with_noise(step)
         after = rate([c.candidate for c in first], own, earlier)
         sequence.append(best_row(after, names, None))
-    repetitions = [] if measured is None else repeated_points(measured, sets[0])
     return Advice(
         names=names,
         current_fraction=samples.remaining_fraction,
         choices=(*first, *rate(grid.candidates(sets[1:]), outcomes)),
-        repetitions=tuple(rate(repetitions, outcomes)),
         sequence=tuple(sequence),
         excluded_points=len(grid.slips) * len(grid.loads) - len(first),
-        measured=measured,
     )
+
+
+def _vague(advice: Advice) -> list[str]:
+    """The parameters that the rows do not identify."""
+    shares = zip(advice.names, advice.current_fraction, strict=True)
+    return [name for name, share in shares if share > NOT_IDENTIFIED_ABOVE]
+
+
+def _row_text(advice: Advice, choice: RatedRow) -> str:
+    """A row, and the fraction of each prior expected to remain after it."""
+    pairs = zip(advice.names, choice.remaining_fraction, strict=True)
+    fractions = ", ".join(f"{name.replace('_', ' ')} {fraction:.0%}" for name, fraction in pairs)
+    return f"{choice.candidate.description} (expected to leave {fractions})"
+
+
+def _lines(advice: Advice) -> Iterator[str]:
+    """What is left of a parameter that is not identified, now and after the best rows for it."""
+    for name in _vague(advice):
+        i = advice.names.index(name)
+        now = float(advice.current_fraction[i])
+        text = f"These rows leave {share_left(now)} the prior's width of {name.replace('_', ' ')}"
+        text += f"; the best row for it leaves {advice.best(name).remaining_fraction[i]:.0%}"
+        if (count := len(advice.sequence)) > 1:
+            text += f", the {count} planned rows {advice.sequence[-1].remaining_fraction[i]:.0%}"
+        yield f"{text}."
+
+
+def _draw_maps(advice: Advice, axes: Any) -> None:
+    """Draw a map for each parameter into axes (1, parameters)."""
+    from matplotlib.patches import Rectangle
+
+    choices = advice.with_channels(advice.channel_sets[0])
+    slips = sorted({c.candidate.slip for c in choices})
+    loads = sorted({c.candidate.load for c in choices})
+    for i, (name, panel) in enumerate(zip(advice.names, np.ravel(axes), strict=True)):
+        fraction = np.full((len(loads), len(slips)), np.nan)
+        for c in choices:
+            cell = loads.index(c.candidate.load), slips.index(c.candidate.slip)
+            fraction[cell] = c.remaining_fraction[i]
+        panel.pcolormesh(fraction, cmap="viridis", vmin=0.0, vmax=1.0)
+        for (row, col), share in np.ndenumerate(fraction):
+            ink = "#010101" if share > 0.6 else "#fdfdfd"
+            if np.isfinite(share) and fraction.size <= MOST_LABELS:
+                text = f"{100 * share:.0f}"
+                panel.text(col + 0.5, row + 0.5, text, ha="center", va="center", color=ink)
+        best = advice.best(name).candidate
+        corner = slips.index(best.slip), loads.index(best.load)
+        panel.add_patch(Rectangle(corner, 1, 1, fill=False, edgecolor="#d62728", linewidth=2.5))
+        if (measured := advice.measured) is not None:
+            slip = np.interp(np.atleast_1d(measured.slip), slips, np.arange(len(slips)) + 0.5)
+            load = np.interp(np.atleast_1d(measured.load), loads, np.arange(len(loads)) + 0.5)
+            panel.plot(slip, load, "o", color="#d62728", fillstyle="none", markersize=18, mew=2)
+        across, up = (range(0, n, -(-n // TICKS)) for n in (len(slips), len(loads)))
+        panel.set_xticks([k + 0.5 for k in across], [f"{slips[k]:.3g}" for k in across])
+        panel.set_yticks([k + 0.5 for k in up], [f"{loads[k]:.3g}" for k in up])
+        panel.grid(visible=False)
+        panel.set_title(f"{name.replace('_', ' ')}: now {advice.current_fraction[i]:.0%}")
+        panel.set_xlabel("slip of the next row")
+        panel.set_ylabel("load of the next row, N")

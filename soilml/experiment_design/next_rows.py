@@ -65,17 +65,17 @@ def advise(
     if rows is None:
         samples = samples_of_prior(selected, case=case)
         found = rate_rows(case, samples, candidate_grid(slips, loads), count=count)
-        notes: list[Remark] = []
+        notes, measured = list[Remark](), None
     else:
         readings = usable_readings(case, as_table(rows))
         case, notes = _with_noise_of_rows(case, readings)
         fitted = readings.thinned()
         notes += fitted.notes
+        measured = readings.at
         found = rate_rows(
             case,
             samples_of_rows(case, fitted, selected, exact_model=exact_model),
             candidate_grid(slips, loads, readings.row_load),
-            measured=readings.at,
             count=count,
             covariates=_mean_covariates(readings.at),
         )
@@ -89,7 +89,7 @@ def advise(
             "posterior samples does not carry the wheel"
         )
         notes.append(Remark("not-carried", text))
-    return replace(found, remarks=tuple(notes))
+    return replace(found, measured=measured, remarks=tuple(notes))
 
 
 def _with_noise_of_rows(case: Case, readings: Readings) -> tuple[Case, list[Remark]]:
