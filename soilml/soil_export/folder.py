@@ -81,9 +81,7 @@ class SoilExport(Result):
             "draws": len(self.draws),
             "remarks": [remark.as_json() for remark in self.remarks],
             "written": list(names),
-            "command": origin.command,
-            "soilml_version": origin.version,
-            "files": [{"name": f.name, "bytes": f.size, "sha256": f.sha256} for f in origin.files],
+            **origin.as_json(),
         }
 
     def origin(self, name: str) -> str:

@@ -139,8 +139,9 @@ def local_soils(
             shared.append(_excess(whole, error))
     if not found:
         raise FitError(f"{drive.source}: no stretch of {LEAST_ROWS} rows or more has an estimate")
-    arrays = map(np.asarray, zip(*found, strict=True))
-    return LocalSoils(tuple(free), *arrays, _typical(shared, len(free)))
+    place, station, patch, score, error = map(np.asarray, zip(*found, strict=True))
+    common = _typical(shared, len(free))
+    return LocalSoils(tuple(free), place, station, patch, score, error, common)
 
 
 def coordinates(estimator: Estimator) -> list[Coordinate]:

@@ -1,4 +1,4 @@
-"""Draws of a soil under another gravity, and what is assumed of it there."""
+"""Draws of a soil under another gravity."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.physics.soils.gravity_law import CHANGED, GravityChange
-from soilml.remarks import Remark
 from soilml.traction.draws import SoilDraws
 
 
@@ -35,21 +34,3 @@ def draws_at_gravity(case: Case, draws: SoilDraws, change: GravityChange) -> Soi
     new = change.parameters(values, change.draws(count))
     columns = [np.broadcast_to(column, count) for column in new.values()]
     return replace(draws, names=tuple(new), values=np.stack(columns, axis=1))
-
-
-def gravity_remark(change: GravityChange) -> Remark:
-    """What was assumed of the soil under the other gravity."""
-    text = {
-        "open": "is drawn between one whose moduli stay and one whose kphi is in proportion to "
-        "gravity: rows under one gravity do not tell which",
-        "constant": "is taken to keep its moduli",
-        "proportional": "is taken to have its kphi in proportion to gravity",
-    }[change.law]
-    if change.ratio < 1.0:
-        text += "; in flights a wheel sank deeper and pulled less than under its load on Earth"
-    return Remark(
-        "gravity-law",
-        f"gravity is {change.target:.3g} m/s^2, rows are from {change.tested:.3g} m/s^2: the soil "
-        f"{text}",
-        severity="warning" if change.law == "constant" else "note",
-    )

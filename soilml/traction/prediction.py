@@ -16,7 +16,6 @@ from soilml.physics.soils.gravity_law import GravityChange
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE
 from soilml.remarks import Remark
 from soilml.traction.draws import SoilDraws
-from soilml.traction.gravity import gravity_remark
 from soilml.traction.measured_range import MeasuredRange, extrapolations
 from soilml.traction.vehicle import DrivenVehicle, Performance, performance
 
@@ -134,7 +133,20 @@ def excluded_effects(case: Case) -> list[Remark]:
 def gravity_remarks(case: Case, gravity: GravityChange | None, of_rover: bool) -> Iterator[Remark]:
     """What is assumed of the soil under another gravity than the Earth's."""
     if gravity is not None and gravity.ratio != 1.0:
-        yield gravity_remark(gravity)
+        text = {
+            "open": "is drawn between one whose moduli stay and one whose kphi is in proportion to "
+            "gravity: rows under one gravity do not tell which",
+            "constant": "is taken to keep its moduli",
+            "proportional": "is taken to have its kphi in proportion to gravity",
+        }[gravity.law]
+        if gravity.ratio < 1.0:
+            text += "; in flights a wheel sank deeper and pulled less than under its load on Earth"
+        yield Remark(
+            "gravity-law",
+            f"gravity is {gravity.target:.3g} m/s^2, rows are from {gravity.tested:.3g} m/s^2: the "
+            f"soil {text}",
+            severity="warning" if gravity.law == "constant" else "note",
+        )
         return
     own = case.rover.gravity if of_rover and case.rover is not None else EARTH
     if abs(own / EARTH - 1.0) > OTHER_GRAVITY:

@@ -87,13 +87,18 @@ def run(args: argparse.Namespace) -> int:
 def _study(args: argparse.Namespace) -> DesignStudy:
     """The question of the file, with what the options change."""
     import math
+    from dataclasses import replace
 
-    from soilml.rover_design.study import read_study, with_changes
+    from soilml.config.wheeled_rover import read_gravity
+    from soilml.rover_design.study import published_soils, read_study
 
-    return with_changes(
-        read_study(args.study),
-        slope=None if args.slope is None else math.radians(args.slope),
-        gravity=args.gravity,
-        soils=parse_names(args.soil),
-        risk=args.risk,
-    )
+    study = read_study(args.study)
+    goal, soil = study.goal, study.soil
+    if args.slope is not None:
+        goal = replace(goal, slope=math.radians(args.slope))
+    if args.risk is not None:
+        goal = replace(goal, risk=args.risk)
+    if (names := parse_names(args.soil)) is not None:
+        soil = replace(published_soils(names), prior=soil.prior)
+    gravity = study.gravity if args.gravity is None else read_gravity(args.gravity)
+    return replace(study, goal=goal, soil=soil, gravity=gravity)
