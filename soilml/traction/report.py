@@ -17,14 +17,7 @@ from soilml.report.numbers import format_quantity, format_range, significant
 from soilml.report.report import Picture, Report
 from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
-from soilml.traction.measured_range import (
-    SAME_LOAD,
-    MeasuredRange,
-)
-from soilml.traction.prediction import (
-    FEWEST,
-    TractionPrediction,
-)
+from soilml.traction.prediction import FEWEST, SAME_LOAD, MeasuredRange, TractionPrediction
 
 STEP = 2  # Tables show every second slip
 _NOTATION = (

@@ -17,14 +17,15 @@ from soilml.io.table import Table
 from soilml.physics.operating_point import COVARIATES
 from soilml.physics.soils.gravity_law import GravityChange
 from soilml.quantities import CHANNELS, column
-from soilml.traction.gravity import draws_at_gravity
-from soilml.traction.measured_range import (
+from soilml.traction.prediction import (
     MeasuredRange,
     band_content,
+    excluded_effects,
+    gravity_remarks,
     measured_loads,
+    predicted,
     slip_grid,
 )
-from soilml.traction.prediction import excluded_effects, gravity_remarks, predicted
 from soilml.traction.report import PullReport
 from soilml.traction.soil_draws import measured_soil
 from soilml.traction.vehicle import LARGEST_SLOPE, DrivenVehicle
@@ -111,7 +112,7 @@ def pull_report(
     reached = [np.ravel(one.loads(np.append(asked, ends))) for one in vehicles]
     draws, prior = soil.with_errors(slip, np.concatenate(reached).tolist(), CHANNELS)
     if gravity is not None:
-        draws, prior = (draws_at_gravity(case, d, gravity) for d in (draws, prior))
+        draws, prior = (d.at_gravity(case, gravity) for d in (draws, prior))
     found = [predicted(one, draws, prior, asked, slip, measured) for one in vehicles]
     key = column("drawbar_pull")
     pull = table[key] if key in table else np.full(len(table), np.nan)
