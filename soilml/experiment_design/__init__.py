@@ -3,7 +3,6 @@
 from soilml.experiment_design.design import (
     Advice,
     CandidateGrid,
-    CandidateRow,
     RatedRow,
     candidate_grid,
     rate_rows,
@@ -18,7 +17,6 @@ from soilml.experiment_design.parameter_samples import (
 __all__ = [
     "Advice",
     "CandidateGrid",
-    "CandidateRow",
     "ParameterSamples",
     "RatedRow",
     "advise",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -41,20 +42,6 @@ NO_ROWS = np.zeros((1, 1), np.float32)  # Log likelihood of no rows
 
 
 @dataclass(frozen=True)
-class CandidateRow:
-    """A row to measure: slip, load (N) and channels."""
-
-    slip: float
-    load: float
-    channels: tuple[str, ...]
-
-    @property
-    def description(self) -> str:
-        """Such as: slip 0.05 at 15 N."""
-        return f"slip {self.slip:.3g} at {self.load:.3g} N"
-
-
-@dataclass(frozen=True)
 class CandidateGrid:
     """Slips and loads (N) that can be driven, each once and ascending."""
 
@@ -75,11 +62,6 @@ class CandidateGrid:
                 f"{len(self.slips)} slips times {len(self.loads)} loads are too many to try; at "
                 f"most {MOST_POINTS} operating points are possible"
             )
-
-    def candidates(self, channels: Sequence[tuple[str, ...]]) -> list[CandidateRow]:
-        """All combinations of slip, load and channels."""
-        points = [(slip, load) for slip in self.slips for load in self.loads]
-        return [CandidateRow(*point, channels=own) for own in channels for point in points]
 
 
 def candidate_grid(
@@ -109,12 +91,14 @@ def channel_sets(declared: Sequence[str]) -> list[tuple[str, ...]]:
 
 @dataclass(frozen=True)
 class RatedRow:
-    """A candidate row and the fraction of each prior's width expected to remain after it, (p,).
+    """A row to measure, and the fraction of each prior's width expected to remain after it, (p,).
 
     The fraction is the root of the expected variance over the prior's standard deviation.
     """
 
-    candidate: CandidateRow
+    slip: float
+    load: float  # N
+    channels: tuple[str, ...]
     remaining_fraction: Floats
 
     @property
@@ -156,12 +140,12 @@ class Advice(Result):
 
     def with_channels(self, channels: tuple[str, ...]) -> tuple[RatedRow, ...]:
         """The choices that measure these channels."""
-        return tuple(c for c in self.choices if c.candidate.channels == channels)
+        return tuple(c for c in self.choices if c.channels == channels)
 
     @property
     def channel_sets(self) -> tuple[tuple[str, ...], ...]:
         """Sets of channels among the choices, the smallest first."""
-        return tuple(dict.fromkeys(c.candidate.channels for c in self.choices))
+        return tuple(dict.fromkeys(c.channels for c in self.choices))
 
     def best(self, name: str | None = None, channels: tuple[str, ...] | None = None) -> RatedRow:
         """The choice with the least remaining fraction of one parameter, or of all (`overall`)."""
@@ -202,7 +186,7 @@ class Advice(Result):
         return self._columns([(str(i), c) for i, c in enumerate(ranked, 1)])
 
     def best_columns(self) -> dict[str, Any]:
-        """A row for each best candidate: in all, for each parameter, repeated, of the sequence."""
+        """A row for each best candidate: in all, for each parameter, of the sequence."""
         rows = [("best in all", self.best())]
         rows += [
             (f"best in all with {own[1]}", self.best(None, own)) for own in self.channel_sets[1:]
@@ -216,9 +200,9 @@ class Advice(Result):
         choices = [choice for _, choice in rows]
         columns: dict[str, Any] = {
             "row": [why.replace("_", " ") for why, _ in rows],
-            "channels": [" + ".join(map(column, c.candidate.channels)) for c in choices],
-            "slip": np.asarray([c.candidate.slip for c in choices]),
-            "load_N": np.asarray([c.candidate.load for c in choices]),
+            "channels": [" + ".join(map(column, c.channels)) for c in choices],
+            "slip": np.asarray([c.slip for c in choices]),
+            "load_N": np.asarray([c.load for c in choices]),
         }
         for i, name in enumerate(self.names):
             columns[f"{name}_left"] = np.asarray([c.remaining_fraction[i] for c in choices])
@@ -275,33 +259,26 @@ def rate_rows(
     ----------
     Chaloner and Verdinelli, Statistical Science 10, 1995.
     """
-    points = [(c.slip, c.load) for c in grid.candidates([()])]
-    index = {point: k for k, point in enumerate(points)}
-    slip, load = np.asarray(list(index)).T
-    others = {key: np.full(len(index), value) for key, value in (covariates or {}).items()}
+    points = list(product(grid.slips, grid.loads))
+    slip, load = np.asarray(points).T
+    others = {key: np.full(len(points), value) for key, value in (covariates or {}).items()}
     ahead = predicted_readings(case, samples, Operating(slip=slip, load=load, **others))
 
-    def log_likelihood(row: CandidateRow, outcomes: ExpectedVariance) -> Floats32:
-        return outcomes.log_likelihood(ahead, row.channels, index[row.slip, row.load])
-
     def rate(
-        candidates: Sequence[CandidateRow],
-        outcomes: ExpectedVariance,
-        earlier: Floats32 = NO_ROWS,
+        channels: tuple[str, ...], outcomes: ExpectedVariance, earlier: Floats32 = NO_ROWS
     ) -> list[RatedRow]:
-        """Candidates that can be driven, after rows with the log likelihood `earlier`."""
-        return [
-            RatedRow(
-                row, np.sqrt(outcomes.remaining_variance(log_likelihood(row, outcomes) + earlier))
-            )
-            for row in candidates
-            if ahead.drivable[index[row.slip, row.load]]
-        ]
+        """Points that can be driven, after rows with the log likelihood `earlier`."""
+        found = []
+        for k in np.flatnonzero(ahead.drivable):
+            log = outcomes.log_likelihood(ahead, channels, int(k)) + earlier
+            left = np.sqrt(outcomes.remaining_variance(log))
+            found.append(RatedRow(*points[k], channels, left))
+        return found
 
     names = tuple(f.path for f in samples.free)
     sets = channel_sets(ahead.channels)
     outcomes = expected_variance(samples, len(ahead.channels), outcome_count)
-    first = rate(grid.candidates(sets[:1]), outcomes)
+    first = rate(sets[0], outcomes)
     if not first:
         raise FitError(
             "at each of these slips and loads some soils that are still possible do not carry the "
@@ -309,16 +286,16 @@ def rate_rows(
         )
     sequence, earlier, own = [best_row(first, names, None)], NO_ROWS, outcomes
     for step in range(1, count):
-        earlier = earlier + log_likelihood(sequence[-1].candidate, own)
+        last = points.index((sequence[-1].slip, sequence[-1].load))
+        earlier = earlier + own.log_likelihood(ahead, sets[0], last)
         own = outcomes.with_noise(step)
-        after = rate([c.candidate for c in first], own, earlier)
-        sequence.append(best_row(after, names, None))
+        sequence.append(best_row(rate(sets[0], own, earlier), names, None))
     return Advice(
         names=names,
         current_fraction=samples.remaining_fraction,
-        choices=(*first, *rate(grid.candidates(sets[1:]), outcomes)),
+        choices=(*first, *(row for own in sets[1:] for row in rate(own, outcomes))),
         sequence=tuple(sequence),
-        excluded_points=len(grid.slips) * len(grid.loads) - len(first),
+        excluded_points=len(points) - len(first),
     )
 
 
@@ -332,7 +309,7 @@ def _row_text(advice: Advice, choice: RatedRow) -> str:
     """A row, and the fraction of each prior expected to remain after it."""
     pairs = zip(advice.names, choice.remaining_fraction, strict=True)
     fractions = ", ".join(f"{name.replace('_', ' ')} {fraction:.0%}" for name, fraction in pairs)
-    return f"{choice.candidate.description} (expected to leave {fractions})"
+    return f"slip {choice.slip:.3g} at {choice.load:.3g} N (expected to leave {fractions})"
 
 
 def _lines(advice: Advice) -> Iterator[str]:
@@ -352,12 +329,12 @@ def _draw_maps(advice: Advice, axes: Any) -> None:
     from matplotlib.patches import Rectangle
 
     choices = advice.with_channels(advice.channel_sets[0])
-    slips = sorted({c.candidate.slip for c in choices})
-    loads = sorted({c.candidate.load for c in choices})
+    slips = sorted({c.slip for c in choices})
+    loads = sorted({c.load for c in choices})
     for i, (name, panel) in enumerate(zip(advice.names, np.ravel(axes), strict=True)):
         fraction = np.full((len(loads), len(slips)), np.nan)
         for c in choices:
-            cell = loads.index(c.candidate.load), slips.index(c.candidate.slip)
+            cell = loads.index(c.load), slips.index(c.slip)
             fraction[cell] = c.remaining_fraction[i]
         panel.pcolormesh(fraction, cmap="viridis", vmin=0.0, vmax=1.0)
         for (row, col), share in np.ndenumerate(fraction):
@@ -365,7 +342,7 @@ def _draw_maps(advice: Advice, axes: Any) -> None:
             if np.isfinite(share) and fraction.size <= MOST_LABELS:
                 text = f"{100 * share:.0f}"
                 panel.text(col + 0.5, row + 0.5, text, ha="center", va="center", color=ink)
-        best = advice.best(name).candidate
+        best = advice.best(name)
         corner = slips.index(best.slip), loads.index(best.load)
         panel.add_patch(Rectangle(corner, 1, 1, fill=False, edgecolor="#d62728", linewidth=2.5))
         if (measured := advice.measured) is not None:

@@ -60,8 +60,14 @@ class PullReport(Result):
         Of a wheel: a row for each load and slip, with what it does on each slope in all of a load.
         """
         if self.of_rover:
-            return _slope_columns(self.by_load[0])
-        return _of_loads(self.by_load, _curve_columns) | _of_loads(self.by_load, _on_each_slope)
+            one = self.by_load[0]
+            return _in_all_rows(_slope_columns(one), _vehicle_columns(one))
+        return _of_loads(
+            self.by_load,
+            lambda one: _in_all_rows(
+                _curve_columns(one), _vehicle_columns(one) | _on_each_slope(one)
+            ),
+        )
 
     def report(self, title: str = "Drawbar pull and slopes") -> Report:
         """Largest pull and steepest slope, curves and slopes, and what limits them."""
@@ -161,29 +167,23 @@ def _of_loads(
     return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
 
 
+def _in_all_rows(columns: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """The columns, and further ones of the same number in all rows."""
+    count = len(next(iter(columns.values())))
+    return {**columns, **{name: np.full(count, value) for name, value in numbers.items()}}
+
+
 def _curve_columns(one: TractionPrediction) -> dict[str, Any]:
-    """A row for each slip on level ground; what belongs to the vehicle in all."""
-    known, prior = one.posterior, one.prior
-    count = len(known.curve_slip)
+    """A row for each slip on level ground."""
+    known = one.posterior
     columns: dict[str, Any] = {"slip": known.curve_slip}
     for name, values in (
         ("drawbar_pull_N", known.pull),
         ("tractive_efficiency", known.efficiency),
         ("sinkage_m", known.deepest),
-        ("largest_drawbar_pull_N", known.largest_pull),
-        ("strongest_slip", known.strongest_slip),
-        ("best_slip", known.best_slip),
-        ("best_efficiency", known.best_efficiency),
-        ("steepest_slope_rad", known.steepest_slope),
-        ("drawbar_pull_N_prior", prior.pull),
-        ("largest_drawbar_pull_N_prior", prior.largest_pull),
-        ("steepest_slope_rad_prior", prior.steepest_slope),
+        ("drawbar_pull_N_prior", one.prior.pull),
     ):
-        columns |= {k: np.broadcast_to(v, count) for k, v in band_columns(name, values).items()}
-    for name, share in zip(
-        ("largest_drawbar_pull", "steepest_slope"), one.remaining_fraction, strict=True
-    ):
-        columns[f"{name}_remaining_fraction"] = np.full(count, share)
+        columns |= band_columns(name, values)
     return columns
 
 
@@ -195,7 +195,6 @@ def _slope_columns(one: TractionPrediction) -> dict[str, Any]:
         ("slip", own.slip),
         ("margin_N", own.margin),
         ("energy_J_per_m", own.energy),
-        ("steepest_slope_rad", own.steepest_slope[:, None] + 0.0 * own.slope),
     ):
         columns |= band_columns(name, draws)
     for name in own.loads if len(own.loads) > 1 else ():
@@ -205,15 +204,33 @@ def _slope_columns(one: TractionPrediction) -> dict[str, Any]:
     return columns
 
 
+def _vehicle_columns(one: TractionPrediction) -> dict[str, Any]:
+    """What belongs to the vehicle, numbers."""
+    known, prior = one.posterior, one.prior
+    columns: dict[str, Any] = {}
+    for name, values in (
+        ("largest_drawbar_pull_N", known.largest_pull),
+        ("strongest_slip", known.strongest_slip),
+        ("best_slip", known.best_slip),
+        ("best_efficiency", known.best_efficiency),
+        ("steepest_slope_rad", known.steepest_slope),
+        ("largest_drawbar_pull_N_prior", prior.largest_pull),
+        ("steepest_slope_rad_prior", prior.steepest_slope),
+    ):
+        columns |= band_columns(name, values)
+    pull, slope = one.remaining_fraction
+    columns["largest_drawbar_pull_remaining_fraction"] = pull
+    columns["steepest_slope_remaining_fraction"] = slope
+    return columns
+
+
 def _on_each_slope(one: TractionPrediction) -> dict[str, Any]:
-    """The columns of slopes as one for each slope, alike for all slips."""
-    own, count = _slope_columns(one), len(one.posterior.curve_slip)
-    columns = {}
+    """The columns of slopes as one for each slope, numbers."""
+    own, columns = _slope_columns(one), {}
     for i, slope in enumerate(np.rad2deg(own.pop("slope_rad"))):
         for name, values in own.items():
-            if not name.startswith("steepest_slope"):
-                start, ending, end = name.partition("_p05" if name.endswith("_p05") else "_p95")
-                columns[f"{start}_at_{slope:g}_deg{ending}{end}"] = np.full(count, values[i])
+            start, ending, _ = name.partition("_p05" if name.endswith("_p05") else "_p95")
+            columns[f"{start}_at_{slope:g}_deg{ending}"] = values[i]
     return columns
 
 
