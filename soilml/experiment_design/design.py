@@ -233,31 +233,16 @@ def rate_rows(
     All ratings assume that the model is correct. A remaining fraction is an expectation over
     readings; the one realised differs.
 
-    Parameters
-    ----------
-    case
-        Model, soil, priors and noise.
-    samples
-        What is known of the parameters: samples of the prior, or of a posterior.
-    grid
-        Slips and loads (N) that can be driven.
-    count
-        Length of the sequence.
-    covariates
-        Further fields of `Operating`, the same for all candidates.
-    outcome_count
-        Number of simulated readings of each candidate.
+    samples: What is known of the parameters: samples of the prior, or of a posterior.
+    grid: Slips and loads (N) that can be driven.
+    count: Length of the sequence.
+    covariates: Further fields of `Operating`, the same for all candidates.
+    outcome_count: Number of simulated readings of each candidate.
 
-    Raises
-    ------
-    FitError
-        Where every point has a probability of 5 % or more that the wheel is not carried.
-    InputError
-        Where no noise is declared.
+    Raises `FitError` where every point has a probability of 5 % or more that the wheel is not
+    carried, and `InputError` where no noise is declared.
 
-    References
-    ----------
-    Chaloner and Verdinelli, Statistical Science 10, 1995.
+    References: Chaloner and Verdinelli, Statistical Science 10, 1995.
     """
     points = list(product(grid.slips, grid.loads))
     slip, load = np.asarray(points).T

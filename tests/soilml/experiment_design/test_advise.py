@@ -6,12 +6,8 @@ from measured_rows import torque_rows
 
 from soilml import identify
 from soilml.errors import FitError
-from soilml.experiment_design import (
-    candidate_grid,
-    rate_rows,
-    samples_of_prior,
-    samples_of_rows,
-)
+from soilml.experiment_design.design import candidate_grid, rate_rows
+from soilml.experiment_design.parameter_samples import samples_of_prior, samples_of_rows
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.usable_readings import usable_readings
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
