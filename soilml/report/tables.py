@@ -91,7 +91,7 @@ class Column:
             words = {True: "yes", False: "no"}
             yield (
                 self.heading,
-                [words.get(v, str(v)) if _is_truth(v) else str(v) for v in self.values],
+                [words[bool(v)] if isinstance(v, bool | np.bool_) else str(v) for v in self.values],
             )
             return
         values = [float("nan") if v is None else float(v) for v in self.values]
@@ -123,10 +123,6 @@ class Column:
             yield "90 %", ends
         if not one and self.sizes is None:
             yield "unit", [unit for _, unit in factors]
-
-
-def _is_truth(value: Any) -> bool:
-    return isinstance(value, bool | np.bool_)
 
 
 def _chained(parts: Iterable[Sequence[Any]]) -> list[Any]:
