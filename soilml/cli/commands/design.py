@@ -21,27 +21,11 @@ compared over the soils that it may meet and over typical errors of the model.
   soilml plan wheels ROVER.toml --slope 20 --gravity moon --picture design.png
   soilml plan wheels ROVER.toml --soil ding2015/lunar_soil,mckay1994/jsc-1
 
-ROVER.toml states the rover; no figure of it is assumed. A dimension is a
-number, a range that is searched, or { values = [...] }:
-
-  [rover]
-  mass = 12 # kg
-  wheels = 4
-  wheelbase = 0.4 # m, from the first axle to the last
-  centre_of_mass = [0.0, 0.18] # m: ahead of the middle, above the ground
-  gravity = "earth"
-
-  [wheel]
-  radius = 0.09 # m
-  width = [0.04, 0.12]
-  lug_height = [0.0, 0.015]
-
-  [soil] # as in a model file; or published ones, each as likely
-  names = ["ding2015/hit_lss1", "wang2016/kls1"]
-
-  [goal] # also margin, torque_limit, energy_limit, slip_limit, risk
-  slope = "15 deg"
-  least = "width" # or energy, torque, ...
+ROVER.toml has [rover], [wheel], [soil] and [goal]; `soilml example design
+FOLDER` writes one. No figure of the rover is assumed. A dimension is a number,
+a range that is searched, or { values = [...] }. [goal] may also have margin,
+torque_limit, energy_limit, slip_limit and risk; its `least` is a dimension,
+energy or torque.
 
 The best design meets the goal with the probability 1 - risk and has the least
 of `least`; where none does, it is the likeliest. The margin is the largest
