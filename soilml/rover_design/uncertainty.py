@@ -9,6 +9,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from soilml.arrays import Floats, Integers
+from soilml.report.numbers import parameter_name
 from soilml.rover_design.performance import Outcomes
 from soilml.rover_design.worlds import DrawnWorlds
 
@@ -29,15 +30,6 @@ WORDS = {
     "drawbar_pull": "other errors of the pull",
     "effect": "another law, or a missing effect",
     "lug_shearing": "how far out lugs shear",
-    "cohesion": "cohesion",
-    "friction_angle": "friction angle",
-    "shear_modulus": "shear modulus",
-    "kc": "kc",
-    "kphi": "kphi",
-    "n": "exponent of sinkage",
-    "a0": "angle of maximum stress",
-    "a1": "its growth with slip",
-    "unit_weight": "unit weight",
 }
 _SHEAR = ("cohesion", "friction_angle", "shear_modulus")
 _BEARING = ("kc", "kphi", "n", "bearing", "bearing_by_load")
@@ -94,7 +86,9 @@ def variance_shares(worlds: DrawnWorlds, outcome: Outcomes) -> list[VarianceShar
     """
     inputs, margin = _inputs(worlds, outcome), _finite(outcome.margin[0])
     return _largest(
-        VarianceShare(WORDS[name], (name,), _explained([columns], margin, ORDER))
+        VarianceShare(
+            WORDS.get(name, parameter_name(name)), (name,), _explained([columns], margin, ORDER)
+        )
         for name, columns in inputs.items()
     )
 
@@ -139,7 +133,7 @@ def _inputs(worlds: DrawnWorlds, outcome: Outcomes) -> dict[str, Floats]:
         del numbers["lug_shearing"]
     for name, values in numbers.items():
         size = float(np.abs(worlds.soil.get(name, values)).max())
-        if name in WORDS and np.ptp(values) > 1e-9 * size:
+        if (name in WORDS or name in soil) and np.ptp(values) > 1e-9 * size:
             inputs[name] = ((values - values.mean()) / values.std())[:, None]
     if worlds.lacking:
         sizes = np.stack([getattr(e, e.about.size) for e in worlds.lacking], axis=1) * worlds.acts
