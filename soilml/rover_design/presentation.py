@@ -111,11 +111,8 @@ def _designs(found: DesignReport) -> ReportTable:
         numbers = numbers[np.unique(np.abs(smallest - steps).argmin(axis=1))]
 
     def values(key: str) -> Floats:
-        best, others = (
-            {**found.best_dimensions, **found.best},
-            {**designs.dimensions, **designs.results},
-        )
-        return np.concatenate([[best[key]], np.asarray(others[key], float)[numbers]])
+        best = found.best_dimensions | found.best
+        return np.concatenate([[best[key]], np.asarray(designs.columns[key], float)[numbers]])
 
     least = RESULTS.get(goal.least, "probability")
     first = ("probability", least)

@@ -79,13 +79,11 @@ class DesignReport(Result):
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each design that was tried: its dimensions and results, SI units."""
-        columns = {**self.designs.dimensions, **self.designs.results}
-        return {"design": np.arange(self.designs.count), **columns}
+        return {"design": np.arange(self.designs.count), **self.designs.columns}
 
     def as_json(self) -> dict[str, Any]:
         """The content of the JSON file, in SI units."""
-        goal, designs = self.study.goal, self.designs
-        columns = {**designs.dimensions, **designs.results}
+        goal = self.study.goal
         return {
             "goal": {
                 "slope_rad": goal.slope,
@@ -101,7 +99,7 @@ class DesignReport(Result):
             "met": self.met,
             "best": {**self.best_dimensions, **self.best},
             "front": self.front.tolist(),
-            "designs": {name: values.tolist() for name, values in columns.items()},
+            "designs": {name: values.tolist() for name, values in self.designs.columns.items()},
             "by_soil": self.by_soil,
             "variance_shares": {one.inputs[0]: one.share for one in self.shares},
             "tests": [

@@ -71,7 +71,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import origin_of, show_result, tell
     from soilml.cli.progress import progress_bar
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
-    from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
     from soilml.optional_imports import need
 
@@ -82,10 +81,7 @@ def run(args: argparse.Namespace) -> int:
 
     table = read_rows(args, RUNS)
     effects = available_effects(args)
-    if args.gear is not None:
-        case = read_case_of_rows(args, args.model, table, effects, with_explanations=True)
-    else:
-        case = read_case(args.model, effects, with_bias=True, with_explanations=True)
+    case = read_case_of_rows(args, args.model, table, effects, with_explanations=True, several=True)
     print_table_hints(table, case)
     with progress_bar(f"analysing {len(table)} rows", 100) as done:
         report = gap(
