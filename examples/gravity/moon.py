@@ -16,7 +16,7 @@ from soilml.io.text_tables import csv_text
 from soilml.numerics.quantiles import quantile_band
 from soilml.physics.soils.gravity_law import LAWS, GravityChange
 from soilml.report.aligned_text import format_table
-from soilml.report.figure_style import save_png
+from soilml.report.report import Picture
 from soilml.report.tables import Column, ReportTable
 from soilml.traction import DrivenVehicle, Performance, performance
 from soilml.traction.prediction import MeasuredRange, slip_grid
@@ -84,7 +84,7 @@ def draw(pulls, path: Path) -> None:
         panel.legend(title="law of gravity", frameon=False, fontsize=9, loc="upper left")
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    save_png(plot, 1, 1, (5.0, 3.8), path)
+    Picture("Moon", plot, 1, 1, (5.0, 3.8), "Pull against slip by law of gravity").save(path)
 
 
 def run() -> None:
