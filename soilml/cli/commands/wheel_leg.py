@@ -147,11 +147,10 @@ def _heavy(args: argparse.Namespace) -> dict[str, Any]:
     from soilml.systems.wheel_legs.strides import UNKNOWN
 
     found: dict[str, Any] = {}
-    if args.assume is not None:
-        needed = f"{', '.join(UNKNOWN)}, such as n=0.7"
-        found["known"] = named_numbers(parse_names(args.assume) or [], "--assume", needed)
+    if assumed := parse_names(args.assume):
+        found["known"] = named_numbers(assumed, "--assume", "NAME=VALUE, such as n=0.7")
         if found["known"].keys() - UNKNOWN.keys():
-            raise InputError(f"--assume is {args.assume!r}; needed are {needed}")
+            raise InputError(f"--assume is {args.assume!r}; needed are {', '.join(UNKNOWN)}")
     if args.wheel is not None:
         sizes = parse_numbers("--wheel", args.wheel).tolist()
         if len(sizes) != 3 or min(sizes) <= 0.0:
