@@ -6,7 +6,6 @@ Fixed numbers of `soilml.soil_maps` were chosen on drives of other seeds.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from scipy.special import ndtri
 from soilml import Estimator, read_case
 from soilml.soil_maps.field import SoilField
 from soilml.soil_maps.local_soils import (
+    MapDrive,
     coordinates,
     follow,
     local_soils,
@@ -69,9 +69,8 @@ def one_drive(case: Row) -> list[Row]:
     held = stretch.any(axis=1)
     noise = {"slip": (SLIP_STD, 0.0), "torque": (0.0, TORQUE_NOISE)}
     estimator = Estimator.load(ROOT / "exported/wheel.onnx").on(noise=noise)
-    names = ("place", "station", "wheel", "row")
-    own = {name: getattr(drive, name)[~held] for name in names}
-    kept = replace(drive, rows=drive.of_rows(~held), **own)
+    own = (values[~held] for values in (drive.place, drive.station, drive.wheel, drive.row))
+    kept = MapDrive(drive.of_rows(~held), *own, drive.source)
     soils = local_soils(estimator, kept, follow(estimator, kept))
     field, free = SoilField(soils), coordinates(estimator)
     low = np.asarray([f.prior.lower for f in free])
