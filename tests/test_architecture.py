@@ -27,7 +27,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/numerics/gaussian_emulator.py": {"scipy"},
     "soilml/systems/rim_stress/stress.py": {"scipy"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},
-    "soilml/experiment_design/presentation.py": {"matplotlib"},
+    "soilml/experiment_design/design.py": {"matplotlib"},
     "soilml/gap/notes.py": {"scipy"},
     "soilml/inference/evidence.py": {"scipy"},
     "soilml/inference/priors.py": {"scipy"},

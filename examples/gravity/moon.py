@@ -16,11 +16,10 @@ from soilml.io.text_tables import csv_text
 from soilml.numerics.quantiles import quantile_band
 from soilml.physics.soils.gravity_law import LAWS, GravityChange
 from soilml.report.aligned_text import format_table
-from soilml.report.figure_style import save_png
+from soilml.report.report import Picture
 from soilml.report.tables import Column, ReportTable
 from soilml.traction import DrivenVehicle, Performance, performance
-from soilml.traction.gravity import draws_at_gravity
-from soilml.traction.measured_range import MeasuredRange, slip_grid
+from soilml.traction.prediction import MeasuredRange, slip_grid
 from soilml.traction.soil_draws import measured_soil
 
 HERE, OUT = Path(__file__).parent, Path("demo/gravity/moon.png")
@@ -48,7 +47,7 @@ def answers(case, table) -> dict[str, Performance]:
     at = int(np.argmin(np.abs(slips - SLIP)))
     found, lines = {}, []
     for law in LAWS:
-        own = draws_at_gravity(case, draws, GravityChange(EARTH, MOON, law))
+        own = draws.at_gravity(case, GravityChange(EARTH, MOON, law))
         moon = found[law] = performance(wheel, own, level, slips)
         cells = [law]
         for part in ("pull", "deepest"):
@@ -85,7 +84,7 @@ def draw(pulls, path: Path) -> None:
         panel.legend(title="law of gravity", frameon=False, fontsize=9, loc="upper left")
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    save_png(plot, 1, 1, (5.0, 3.8), path)
+    Picture("Moon", plot, 1, 1, (5.0, 3.8), "Pull against slip by law of gravity").save(path)
 
 
 def run() -> None:

@@ -60,7 +60,7 @@ SECTIONS: dict[str, dict[str, tuple[str, str]]] = {
         "compare": (_GROUND + "compare", "score trained files and fits on known soils"),
         "export c": (_GROUND + "export_c", "a trained file as C99 code"),
         "export slip": (_GROUND + "export_slip", "the slip filter of a rover as ONNX and C99"),
-        "export soil": (_OWN + "export_soil", "a soil for Chrono, Gazebo, Isaac or a table"),
+        "export soil": (_OWN + "export_soil", "a soil for Chrono, Gazebo or a table"),
     },
     "Rover": {
         "pull": (_OWN + "pull", "drawbar pull, and the steepest slope that can be climbed"),

@@ -58,12 +58,17 @@ def read_case_of_rows(
     effects: Mapping[str, type[Effect]] = EFFECTS,
     with_bias: bool = True,
     with_explanations: bool = False,
+    several: bool = False,
 ) -> Case:
     """The case of one gear: that of `--gear`, or the one that all rows name.
+
+    several: Whether the case may have all gears of the file where `--gear` names none.
 
     Raises `InputError` where the file has several gears and neither says which.
     """
     case = read_case(path, effects, with_bias, with_explanations=with_explanations)
+    if several and args.gear is None:
+        return case
     names = [] if table is None or "gear" not in table else list(dict.fromkeys(table["gear"]))
     gear: str | None = args.gear
     if case.gears and gear is None and len(names) == 1 and names[0]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,39 +21,24 @@ from soilml.experiment_design.expected_variance import (
     predicted_readings,
 )
 from soilml.experiment_design.parameter_samples import ParameterSamples
-from soilml.fitting.levels import replicate_rows
 from soilml.physics.operating_point import MOST_SLIP, Operating
-from soilml.quantities import column
+from soilml.quantities import NOT_IDENTIFIED_ABOVE, column
 from soilml.remarks import Remark
+from soilml.report.numbers import parameter_name, share_left
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
-
-if TYPE_CHECKING:
-    from soilml.report.report import Report
 
 #: Default slips, and the number of default loads.
 SLIPS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 LOADS = 5
 #: Default loads run from this multiple of the smallest measured to this of the largest.
 LIGHTER, HEAVIER = 0.5, 2.0
-#: Most operating points whose repetition is rated.
-REPETITIONS = 6
+#: Most grid points that are labelled with their value in a map, and most ticks of an axis.
+MOST_LABELS, TICKS = 80, 8
 MOST_POINTS = 1000  # Most operating points of a grid
 Floats32 = NDArray[np.float32]
 NO_ROWS = np.zeros((1, 1), np.float32)  # Log likelihood of no rows
-
-
-@dataclass(frozen=True)
-class CandidateRow:
-    """A row to measure: slip, load (N) and channels."""
-
-    slip: float
-    load: float
-    channels: tuple[str, ...]
-
-    @property
-    def description(self) -> str:
-        """Such as: slip 0.05 at 15 N."""
-        return f"slip {self.slip:.3g} at {self.load:.3g} N"
 
 
 @dataclass(frozen=True)
@@ -75,11 +62,6 @@ class CandidateGrid:
                 f"{len(self.slips)} slips times {len(self.loads)} loads are too many to try; at "
                 f"most {MOST_POINTS} operating points are possible"
             )
-
-    def candidates(self, channels: Sequence[tuple[str, ...]]) -> list[CandidateRow]:
-        """All combinations of slip, load and channels."""
-        points = [(slip, load) for slip in self.slips for load in self.loads]
-        return [CandidateRow(*point, channels=own) for own in channels for point in points]
 
 
 def candidate_grid(
@@ -107,30 +89,16 @@ def channel_sets(declared: Sequence[str]) -> list[tuple[str, ...]]:
     return [(first,), *[(first, other) for other in others]]
 
 
-def repeated_points(measured: Operating, channels: tuple[str, ...] = ()) -> list[CandidateRow]:
-    """The operating points of rows (n,), each once; of many, `REPETITIONS` spread over all.
-
-    The point of replicate rows is their median.
-    """
-    slip, load = np.atleast_1d(measured.slip), np.atleast_1d(measured.load)
-    group = replicate_rows(Operating(slip=slip, load=load))
-    ends = np.cumsum(np.unique(group, return_counts=True)[1])
-    members = np.split(np.argsort(group, kind="stable"), ends[:-1])
-    points = sorted((float(np.median(slip[i])), float(np.median(load[i]))) for i in members)
-    if len(points) > REPETITIONS:
-        kept = np.linspace(0, len(points) - 1, REPETITIONS).round().astype(int)
-        points = [points[i] for i in kept]
-    return [CandidateRow(*point, channels=channels) for point in points]
-
-
 @dataclass(frozen=True)
 class RatedRow:
-    """A candidate row and the fraction of each prior's width expected to remain after it, (p,).
+    """A row to measure, and the fraction of each prior's width expected to remain after it, (p,).
 
     The fraction is the root of the expected variance over the prior's standard deviation.
     """
 
-    candidate: CandidateRow
+    slip: float
+    load: float  # N
+    channels: tuple[str, ...]
     remaining_fraction: Floats
 
     @property
@@ -151,8 +119,6 @@ class Advice(Result):
         Fraction (p,) of each prior's width that remains before the next measurement.
     choices
         All candidates at which the wheel can be driven.
-    repetitions
-        Rows that repeat measured operating points.
     sequence
         The best first row, the best second one after it, and so on; their fractions are those after
         all rows so far.
@@ -167,7 +133,6 @@ class Advice(Result):
     names: tuple[str, ...]
     current_fraction: Floats
     choices: tuple[RatedRow, ...]
-    repetitions: tuple[RatedRow, ...]
     sequence: tuple[RatedRow, ...]
     excluded_points: int
     measured: Operating | None = None
@@ -175,26 +140,45 @@ class Advice(Result):
 
     def with_channels(self, channels: tuple[str, ...]) -> tuple[RatedRow, ...]:
         """The choices that measure these channels."""
-        return tuple(c for c in self.choices if c.candidate.channels == channels)
+        return tuple(c for c in self.choices if c.channels == channels)
 
     @property
     def channel_sets(self) -> tuple[tuple[str, ...], ...]:
         """Sets of channels among the choices, the smallest first."""
-        return tuple(dict.fromkeys(c.candidate.channels for c in self.choices))
+        return tuple(dict.fromkeys(c.channels for c in self.choices))
 
     def best(self, name: str | None = None, channels: tuple[str, ...] | None = None) -> RatedRow:
         """The choice with the least remaining fraction of one parameter, or of all (`overall`)."""
         return best_row(self.with_channels(channels or self.channel_sets[0]), self.names, name)
 
-    def best_repetition(self, name: str | None = None) -> RatedRow | None:
-        """The best repetition of a measured operating point; None without measured rows."""
-        return best_row(self.repetitions, self.names, name) if self.repetitions else None
-
     def report(self) -> Report:
         """The best next rows, and maps of what each row would leave."""
-        from soilml.experiment_design.presentation import report_of_advice
-
-        return report_of_advice(self)
+        columns = []
+        for name, values in self.best_columns().items():
+            if name.endswith("_left"):
+                symbol = parameter_name(name.removesuffix("_left")).split()[-1]
+                columns.append(Column(f"{symbol} left", values.tolist(), "share", digits=2))
+            elif name != "channels":
+                unit = "N" if name == "load_N" else "1"
+                columns.append(Column(name.removesuffix("_N"), list(values), unit, digits=3))
+        verdict, count = f"Measure next: {_row_text(self, self.best())}.", len(self.names)
+        vague = _vague(self)
+        return Report(
+            kind="plan",
+            verdict=verdict,
+            lines=[] if self.measured is None else list(_lines(self)),
+            tables=[ReportTable("Rows to measure next", columns, "Width left of each prior.")],
+            pictures=[
+                Picture(
+                    "Next rows", partial(_draw_maps, self), 1, count, (3.8 * count, 3.6), verdict,
+                    "Expected width, in percent of the prior's, after a row at this slip and load. "
+                    "Frame: the best row. Rings: measured rows. Blank: soils may not carry it.",
+                )
+            ],
+            remarks=self.remarks,
+            status=f"{len(vague)} of {count} open" if vague else "identified",
+            title="Measurement to make next",
+        )  # fmt: skip
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each candidate, the best first, with the fractions that it leaves."""
@@ -202,14 +186,12 @@ class Advice(Result):
         return self._columns([(str(i), c) for i, c in enumerate(ranked, 1)])
 
     def best_columns(self) -> dict[str, Any]:
-        """A row for each best candidate: in all, for each parameter, repeated, of the sequence."""
+        """A row for each best candidate: in all, for each parameter, of the sequence."""
         rows = [("best in all", self.best())]
         rows += [
             (f"best in all with {own[1]}", self.best(None, own)) for own in self.channel_sets[1:]
         ]
         rows += [(f"best for {name}", self.best(name)) for name in self.names]
-        if (repeat := self.best_repetition()) is not None:
-            rows.append(("best repeat", repeat))
         if (count := len(self.sequence)) > 1:
             rows += [(f"row {i} of {count}", c) for i, c in enumerate(self.sequence, 1)]
         return self._columns(rows)
@@ -218,9 +200,9 @@ class Advice(Result):
         choices = [choice for _, choice in rows]
         columns: dict[str, Any] = {
             "row": [why.replace("_", " ") for why, _ in rows],
-            "channels": [" + ".join(map(column, c.candidate.channels)) for c in choices],
-            "slip": np.asarray([c.candidate.slip for c in choices]),
-            "load_N": np.asarray([c.candidate.load for c in choices]),
+            "channels": [" + ".join(map(column, c.channels)) for c in choices],
+            "slip": np.asarray([c.slip for c in choices]),
+            "load_N": np.asarray([c.load for c in choices]),
         }
         for i, name in enumerate(self.names):
             columns[f"{name}_left"] = np.asarray([c.remaining_fraction[i] for c in choices])
@@ -241,7 +223,6 @@ def rate_rows(
     samples: ParameterSamples,
     grid: CandidateGrid,
     *,
-    measured: Operating | None = None,
     count: int = 1,
     covariates: Mapping[str, float] | None = None,
     outcome_count: int = OUTCOMES,
@@ -252,63 +233,37 @@ def rate_rows(
     All ratings assume that the model is correct. A remaining fraction is an expectation over
     readings; the one realised differs.
 
-    Parameters
-    ----------
-    case
-        Model, soil, priors and noise.
-    samples
-        What is known of the parameters: samples of the prior, or of a posterior.
-    grid
-        Slips and loads (N) that can be driven.
-    measured
-        Operating points of earlier rows, whose repetition is rated for comparison.
-    count
-        Length of the sequence.
-    covariates
-        Further fields of `Operating`, the same for all candidates.
-    outcome_count
-        Number of simulated readings of each candidate.
+    samples: What is known of the parameters: samples of the prior, or of a posterior.
+    grid: Slips and loads (N) that can be driven.
+    count: Length of the sequence.
+    covariates: Further fields of `Operating`, the same for all candidates.
+    outcome_count: Number of simulated readings of each candidate.
 
-    Raises
-    ------
-    FitError
-        Where every point has a probability of 5 % or more that the wheel is not carried.
-    InputError
-        Where no noise is declared.
+    Raises `FitError` where every point has a probability of 5 % or more that the wheel is not
+    carried, and `InputError` where no noise is declared.
 
-    References
-    ----------
-    Chaloner and Verdinelli, Statistical Science 10, 1995.
+    References: Chaloner and Verdinelli, Statistical Science 10, 1995.
     """
-    points = [(c.slip, c.load) for c in grid.candidates([()])]
-    if measured is not None:
-        points += [(c.slip, c.load) for c in repeated_points(measured)]
-    index = {point: k for k, point in enumerate(dict.fromkeys(points))}
-    slip, load = np.asarray(list(index)).T
-    others = {key: np.full(len(index), value) for key, value in (covariates or {}).items()}
+    points = list(product(grid.slips, grid.loads))
+    slip, load = np.asarray(points).T
+    others = {key: np.full(len(points), value) for key, value in (covariates or {}).items()}
     ahead = predicted_readings(case, samples, Operating(slip=slip, load=load, **others))
 
-    def log_likelihood(row: CandidateRow, outcomes: ExpectedVariance) -> Floats32:
-        return outcomes.log_likelihood(ahead, row.channels, index[row.slip, row.load])
-
     def rate(
-        candidates: Sequence[CandidateRow],
-        outcomes: ExpectedVariance,
-        earlier: Floats32 = NO_ROWS,
+        channels: tuple[str, ...], outcomes: ExpectedVariance, earlier: Floats32 = NO_ROWS
     ) -> list[RatedRow]:
-        """Candidates that can be driven, after rows with the log likelihood `earlier`."""
-        return [
-            RatedRow(
-                row, np.sqrt(outcomes.remaining_variance(log_likelihood(row, outcomes) + earlier))
-            )
-            for row in candidates
-            if ahead.drivable[index[row.slip, row.load]]
-        ]
+        """Points that can be driven, after rows with the log likelihood `earlier`."""
+        found = []
+        for k in np.flatnonzero(ahead.drivable):
+            log = outcomes.log_likelihood(ahead, channels, int(k)) + earlier
+            left = np.sqrt(outcomes.remaining_variance(log))
+            found.append(RatedRow(*points[k], channels, left))
+        return found
 
     names = tuple(f.path for f in samples.free)
     sets = channel_sets(ahead.channels)
     outcomes = expected_variance(samples, len(ahead.channels), outcome_count)
-    first = rate(grid.candidates(sets[:1]), outcomes)
+    first = rate(sets[0], outcomes)
     if not first:
         raise FitError(
             "at each of these slips and loads some soils that are still possible do not carry the "
@@ -316,17 +271,73 @@ def rate_rows(
         )
     sequence, earlier, own = [best_row(first, names, None)], NO_ROWS, outcomes
     for step in range(1, count):
-        earlier = earlier + log_likelihood(sequence[-1].candidate, own)
+        last = points.index((sequence[-1].slip, sequence[-1].load))
+        earlier = earlier + own.log_likelihood(ahead, sets[0], last)
         own = outcomes.with_noise(step)
-        after = rate([c.candidate for c in first], own, earlier)
-        sequence.append(best_row(after, names, None))
-    repetitions = [] if measured is None else repeated_points(measured, sets[0])
+        sequence.append(best_row(rate(sets[0], own, earlier), names, None))
     return Advice(
         names=names,
         current_fraction=samples.remaining_fraction,
-        choices=(*first, *rate(grid.candidates(sets[1:]), outcomes)),
-        repetitions=tuple(rate(repetitions, outcomes)),
+        choices=(*first, *(row for own in sets[1:] for row in rate(own, outcomes))),
         sequence=tuple(sequence),
-        excluded_points=len(grid.slips) * len(grid.loads) - len(first),
-        measured=measured,
+        excluded_points=len(points) - len(first),
     )
+
+
+def _vague(advice: Advice) -> list[str]:
+    """The parameters that the rows do not identify."""
+    shares = zip(advice.names, advice.current_fraction, strict=True)
+    return [name for name, share in shares if share > NOT_IDENTIFIED_ABOVE]
+
+
+def _row_text(advice: Advice, choice: RatedRow) -> str:
+    """A row, and the fraction of each prior expected to remain after it."""
+    pairs = zip(advice.names, choice.remaining_fraction, strict=True)
+    fractions = ", ".join(f"{name.replace('_', ' ')} {fraction:.0%}" for name, fraction in pairs)
+    return f"slip {choice.slip:.3g} at {choice.load:.3g} N (expected to leave {fractions})"
+
+
+def _lines(advice: Advice) -> Iterator[str]:
+    """What is left of a parameter that is not identified, now and after the best rows for it."""
+    for name in _vague(advice):
+        i = advice.names.index(name)
+        now = float(advice.current_fraction[i])
+        text = f"These rows leave {share_left(now)} the prior's width of {name.replace('_', ' ')}"
+        text += f"; the best row for it leaves {advice.best(name).remaining_fraction[i]:.0%}"
+        if (count := len(advice.sequence)) > 1:
+            text += f", the {count} planned rows {advice.sequence[-1].remaining_fraction[i]:.0%}"
+        yield f"{text}."
+
+
+def _draw_maps(advice: Advice, axes: Any) -> None:
+    """Draw a map for each parameter into axes (1, parameters)."""
+    from matplotlib.patches import Rectangle
+
+    choices = advice.with_channels(advice.channel_sets[0])
+    slips = sorted({c.slip for c in choices})
+    loads = sorted({c.load for c in choices})
+    for i, (name, panel) in enumerate(zip(advice.names, np.ravel(axes), strict=True)):
+        fraction = np.full((len(loads), len(slips)), np.nan)
+        for c in choices:
+            cell = loads.index(c.load), slips.index(c.slip)
+            fraction[cell] = c.remaining_fraction[i]
+        panel.pcolormesh(fraction, cmap="viridis", vmin=0.0, vmax=1.0)
+        for (row, col), share in np.ndenumerate(fraction):
+            ink = "#010101" if share > 0.6 else "#fdfdfd"
+            if np.isfinite(share) and fraction.size <= MOST_LABELS:
+                text = f"{100 * share:.0f}"
+                panel.text(col + 0.5, row + 0.5, text, ha="center", va="center", color=ink)
+        best = advice.best(name)
+        corner = slips.index(best.slip), loads.index(best.load)
+        panel.add_patch(Rectangle(corner, 1, 1, fill=False, edgecolor="#d62728", linewidth=2.5))
+        if (measured := advice.measured) is not None:
+            slip = np.interp(np.atleast_1d(measured.slip), slips, np.arange(len(slips)) + 0.5)
+            load = np.interp(np.atleast_1d(measured.load), loads, np.arange(len(loads)) + 0.5)
+            panel.plot(slip, load, "o", color="#d62728", fillstyle="none", markersize=18, mew=2)
+        across, up = (range(0, n, -(-n // TICKS)) for n in (len(slips), len(loads)))
+        panel.set_xticks([k + 0.5 for k in across], [f"{slips[k]:.3g}" for k in across])
+        panel.set_yticks([k + 0.5 for k in up], [f"{loads[k]:.3g}" for k in up])
+        panel.grid(visible=False)
+        panel.set_title(f"{name.replace('_', ' ')}: now {advice.current_fraction[i]:.0%}")
+        panel.set_xlabel("slip of the next row")
+        panel.set_ylabel("load of the next row, N")

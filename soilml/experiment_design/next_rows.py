@@ -16,7 +16,7 @@ from soilml.fitting.coordinates import select_free
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
 from soilml.io.read_table import Rows, as_table
-from soilml.physics.operating_point import COVARIATES, Operating
+from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
 from soilml.remarks import Remark
 
@@ -65,19 +65,21 @@ def advise(
     if rows is None:
         samples = samples_of_prior(selected, case=case)
         found = rate_rows(case, samples, candidate_grid(slips, loads), count=count)
-        notes: list[Remark] = []
+        notes, measured = list[Remark](), None
     else:
         readings = usable_readings(case, as_table(rows))
         case, notes = _with_noise_of_rows(case, readings)
         fitted = readings.thinned()
         notes += fitted.notes
+        measured = readings.at
+        known = {name: getattr(measured, name) for name in COVARIATES}
+        covariates = {n: float(np.mean(v)) for n, v in known.items() if v is not None}
         found = rate_rows(
             case,
             samples_of_rows(case, fitted, selected, exact_model=exact_model),
             candidate_grid(slips, loads, readings.row_load),
-            measured=readings.at,
             count=count,
-            covariates=_mean_covariates(readings.at),
+            covariates=covariates,
         )
     if case.states_model_error:
         which = "[discrepancy]" if case.remainder is None else "error of the [remainder]"
@@ -89,7 +91,7 @@ def advise(
             "posterior samples does not carry the wheel"
         )
         notes.append(Remark("not-carried", text))
-    return replace(found, remarks=tuple(notes))
+    return replace(found, measured=measured, remarks=tuple(notes))
 
 
 def _with_noise_of_rows(case: Case, readings: Readings) -> tuple[Case, list[Remark]]:
@@ -103,9 +105,3 @@ def _with_noise_of_rows(case: Case, readings: Readings) -> tuple[Case, list[Rema
             text = f"the noise of further {key} is taken from {key}_std: {std:.3g}"
             notes.append(Remark("noise-of-rows", text, (key,), "note"))
     return replace(case, noise=noise), notes
-
-
-def _mean_covariates(at: Operating) -> dict[str, float]:
-    """Means of the covariates of measured rows, which are assumed for the next row."""
-    values = {field: getattr(at, field) for field in COVARIATES}
-    return {field: float(np.mean(value)) for field, value in values.items() if value is not None}

@@ -57,7 +57,7 @@ def importance_sample(
     p: int,
     seed: int = 0,
     least_effective_size: float = LEAST_EFFECTIVE_SIZE,
-    around: tuple[Floats, Floats] | ImportanceSample | None = None,
+    around: tuple[Floats, Floats] | None = None,
     most_samples: float = math.inf,
     later: int = LATER_ROUND,
 ) -> ImportanceSample:
@@ -78,8 +78,8 @@ def importance_sample(
     seed: Of the random numbers.
     least_effective_size: Effective sample size at which sampling ends.
     around: Middle (p,) of a density that is similar to this one, and a root (p, p) of its
-        covariance; or samples of it. The first round is then drawn from it: of many dimensions, or
-        a narrow density, hardly any point of a Latin hypercube is where the density is.
+        covariance. The first round is then drawn from it: of many dimensions, or a narrow density,
+        hardly any point of a Latin hypercube is where the density is.
     most_samples: Number of samples at which sampling ends anyway.
     later: Samples of each round after the first; fewer suit a density that costs much.
 
@@ -91,10 +91,7 @@ def importance_sample(
     if around is None:
         u, uniform = latin_hypercube(FIRST_ROUND, p, rng), float(FIRST_ROUND)
     else:
-        if isinstance(around, ImportanceSample):
-            mixtures.append(_Mixture.of(around.u, around.weights, rng))
-        else:
-            mixtures.append(_Mixture(around[0][None], around[1]))
+        mixtures.append(_Mixture(around[0][None], around[1]))
         u, uniform = _inside(mixtures[0].draw(later, rng)), 0.0
     logs = log_density(u)
     # proposals: sum over rounds of n_k q_k at each sample

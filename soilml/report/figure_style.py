@@ -6,7 +6,7 @@ import html
 import io
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -107,19 +107,13 @@ def take_axes(ax: Any, rows: int, columns: int, size: tuple[float, float]) -> ND
     return given.reshape(rows, columns)
 
 
-def save_png(
-    draw: Callable[[Any], object],
-    rows: int,
-    columns: int,
-    size: tuple[float, float],
-    path: str | os.PathLike[str],
-) -> None:
-    """A figure with axes (rows, columns), size in inches, which `draw` fills, as a PNG file."""
+def save_png(picture: Picture, path: str | os.PathLike[str]) -> None:
+    """Write a picture as a PNG file."""
     with report_style():
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=size, layout="constrained")
-        draw(figure.subplots(rows, columns, squeeze=False))
+        figure = Figure(figsize=picture.size, layout="constrained")
+        picture.draw(figure.subplots(picture.rows, picture.columns, squeeze=False))
         figure.savefig(path, format="png", dpi=110, metadata={"Software": "soilml"})
 
 

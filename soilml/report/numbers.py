@@ -182,11 +182,6 @@ def share_left(fraction: float) -> str:
     return f"{fraction:.0%} of" if round(fraction, 2) < 1.0 else "all of"
 
 
-def format_log_density(gain: float, std_error: float | None) -> str:
-    """A difference of log densities, with its standard error where that is known: +5.1 +- 0.4."""
-    return f"{gain:+.1f}" + ("" if std_error is None else f" +- {std_error:.1f}")
-
-
 def format_probability(p: float) -> str:
     """A probability with two digits; near 0 and 1 as a bound."""
     if p < LEAST_STATED:

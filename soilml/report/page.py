@@ -70,6 +70,11 @@ class Provenance:
         records = tuple(InputRecord.of(name) for name in names)
         return Provenance(shlex.join(["soilml", *words]), __version__, records)
 
+    def as_json(self) -> dict[str, Any]:
+        """The entries of a JSON file."""
+        files = [{"name": f.name, "bytes": f.size, "sha256": f.sha256} for f in self.files]
+        return {"command": self.command, "soilml_version": self.version, "files": files}
+
 
 def page_content(report: Report) -> dict[str, Any]:
     """What a page shows of a report: texts, cells of tables, and pictures as elements `svg`."""
@@ -141,9 +146,7 @@ def report_entry(report: Report, origin: Provenance) -> dict[str, Any]:
         "format": "soilml-report",
         "version": FORMAT_VERSION,
         "kind": report.kind,
-        "command": origin.command,
-        "soilml_version": origin.version,
-        "files": [{"name": f.name, "bytes": f.size, "sha256": f.sha256} for f in origin.files],
+        **origin.as_json(),
         "answer": report.answer,
         "warnings": [remark.as_json() for remark in report.remarks],
         "next": list(report.next_steps),

@@ -54,7 +54,7 @@ class Picture:
         """Write it as a PNG file."""
         from soilml.report.figure_style import save_png
 
-        save_png(self.draw, self.rows, self.columns, self.size, path)
+        save_png(self, path)
 
 
 @dataclass(frozen=True)

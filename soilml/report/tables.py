@@ -8,7 +8,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -25,17 +25,6 @@ from soilml.report.numbers import (
 _MOST_TEXT = 36  # Characters of a cell of text on a terminal
 _LEAST_LAST = 24  # Characters of a last column of words, at least
 _ENDINGS = ("_std", "_p05", "_p95")
-
-
-class Band(Protocol):
-    """A median and the ends of its 90 % band."""
-
-    @property
-    def lower(self) -> Any: ...
-    @property
-    def middle(self) -> Any: ...
-    @property
-    def upper(self) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -60,8 +49,8 @@ class Column:
     sizes: Sequence[float] | None = None
 
     @staticmethod
-    def of_bands(heading: str, bands: Iterable[Band], unit: str = "1", digits: int = 3) -> Column:
-        """Medians of bands with their ends."""
+    def of_bands(heading: str, bands: Iterable[Any], unit: str = "1", digits: int = 3) -> Column:
+        """The `middle` of bands with their ends, `lower` and `upper`."""
         values = [(float(b.lower), float(b.middle), float(b.upper)) for b in bands]
         low, middle, high = ([v[i] for v in values] for i in range(3))
         return Column(heading, middle, unit, ends=(low, high), digits=digits)
@@ -91,7 +80,7 @@ class Column:
             words = {True: "yes", False: "no"}
             yield (
                 self.heading,
-                [words.get(v, str(v)) if _is_truth(v) else str(v) for v in self.values],
+                [words[bool(v)] if isinstance(v, bool | np.bool_) else str(v) for v in self.values],
             )
             return
         values = [float("nan") if v is None else float(v) for v in self.values]
@@ -123,10 +112,6 @@ class Column:
             yield "90 %", ends
         if not one and self.sizes is None:
             yield "unit", [unit for _, unit in factors]
-
-
-def _is_truth(value: Any) -> bool:
-    return isinstance(value, bool | np.bool_)
 
 
 def _chained(parts: Iterable[Sequence[Any]]) -> list[Any]:

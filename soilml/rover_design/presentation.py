@@ -111,11 +111,8 @@ def _designs(found: DesignReport) -> ReportTable:
         numbers = numbers[np.unique(np.abs(smallest - steps).argmin(axis=1))]
 
     def values(key: str) -> Floats:
-        best, others = (
-            {**found.best_dimensions, **found.best},
-            {**designs.dimensions, **designs.results},
-        )
-        return np.concatenate([[best[key]], np.asarray(others[key], float)[numbers]])
+        best = found.best_dimensions | found.best
+        return np.concatenate([[best[key]], np.asarray(designs.columns[key], float)[numbers]])
 
     least = RESULTS.get(goal.least, "probability")
     first = ("probability", least)
@@ -140,14 +137,15 @@ def _designs(found: DesignReport) -> ReportTable:
 
 def _tables(found: DesignReport) -> Iterator[ReportTable]:
     if found.by_soil:
-        middle, low, high = (
-            [one.margin[f"margin_N{end}"] for one in found.by_soil] for end in ("", "_p05", "_p95")
+        met, middle, low, high = (
+            [one[name] for one in found.by_soil.values()]
+            for name in ("probability", "margin_N", "margin_N_p05", "margin_N_p95")
         )
         yield ReportTable(
             "The best design on each soil",
             [
-                Column("soil", [one.name for one in found.by_soil]),
-                Column("goal met", [o.probability for o in found.by_soil], "share", digits=3),
+                Column("soil", list(found.by_soil)),
+                Column("goal met", met, "share", digits=3),
                 Column("margin", middle, "N", ends=(low, high)),
             ],
         )

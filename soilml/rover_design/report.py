@@ -30,7 +30,6 @@ from soilml.rover_design.search import (
 from soilml.rover_design.study import DesignStudy, read_study
 from soilml.rover_design.uncertainty import (
     DRAWS,
-    PossibleTest,
     VarianceShare,
     possible_tests,
     variance_shares,
@@ -45,19 +44,6 @@ WORLDS = 1000  # Draws of soil and model error under which designs are compared
 Progress = Callable[[str, int, int], None]
 
 
-@dataclass(frozen=True)
-class SoilOutcome:
-    """What the best design does on one of several soils.
-
-    probability: Of meeting the goal.
-    margin: Median and ends of the 90 % band, N, by column name.
-    """
-
-    name: str
-    probability: float
-    margin: dict[str, float]
-
-
 @dataclass(frozen=True, repr=False)
 class DesignReport(Result):
     """Designs that were tried, the best of them, and what its margin depends on.
@@ -68,7 +54,7 @@ class DesignReport(Result):
     best_dimensions: Its dimensions.
     met: Whether it meets the goal with the probability that the risk leaves.
     front: Numbers of the designs that no other one beats in margin and in what is to be least.
-    by_soil: What the best design does on each of several soils; empty for one.
+    by_soil: What the best design does on each of several soils, by column name; empty for one.
     shares: First-order shares of the variance of the best design's margin.
     tests: Tests that would reduce it.
     remarks: What limits the answer.
@@ -80,9 +66,9 @@ class DesignReport(Result):
     best_dimensions: dict[str, float]
     met: bool
     front: NDArray[np.int64]
-    by_soil: tuple[SoilOutcome, ...]
+    by_soil: dict[str, dict[str, float]]
     shares: tuple[VarianceShare, ...]
-    tests: tuple[PossibleTest, ...]
+    tests: tuple[VarianceShare, ...]
     remarks: tuple[Remark, ...]
 
     def report(self, title: str = "Wheels of a rover") -> Report:
@@ -93,13 +79,11 @@ class DesignReport(Result):
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each design that was tried: its dimensions and results, SI units."""
-        columns = {**self.designs.dimensions, **self.designs.results}
-        return {"design": np.arange(self.designs.count), **columns}
+        return {"design": np.arange(self.designs.count), **self.designs.columns}
 
     def as_json(self) -> dict[str, Any]:
         """The content of the JSON file, in SI units."""
-        goal, designs = self.study.goal, self.designs
-        columns = {**designs.dimensions, **designs.results}
+        goal = self.study.goal
         return {
             "goal": {
                 "slope_rad": goal.slope,
@@ -115,10 +99,9 @@ class DesignReport(Result):
             "met": self.met,
             "best": {**self.best_dimensions, **self.best},
             "front": self.front.tolist(),
-            "designs": {name: values.tolist() for name, values in columns.items()},
-            "by_soil": {one.name: {"probability": one.probability} | one.margin
-                        for one in self.by_soil},
-            "variance_shares": {one.name: one.share for one in self.shares},
+            "designs": {name: values.tolist() for name, values in self.designs.columns.items()},
+            "by_soil": self.by_soil,
+            "variance_shares": {one.inputs[0]: one.share for one in self.shares},
             "tests": [
                 {"test": one.text, "inputs": list(one.inputs), "share": one.share,
                  "command": one.command}
@@ -185,23 +168,23 @@ def design(
         best_dimensions=dimensions,
         met=enough,
         front=pareto_front(study, found),
-        by_soil=tuple(_by_soil(own, outcome)),
+        by_soil=_by_soil(own, outcome),
         shares=tuple(variance_shares(own, outcome)),
         tests=tuple(possible_tests(own, outcome)),
         remarks=remarks,
     )
 
 
-def _by_soil(worlds: DrawnWorlds, outcome: Outcomes) -> Iterator[SoilOutcome]:
-    if len(worlds.kinds) < 2:
-        return
-    for number, name in enumerate(worlds.kinds):
+def _by_soil(worlds: DrawnWorlds, outcome: Outcomes) -> dict[str, dict[str, float]]:
+    """Probability of meeting the goal, and margin, on each soil; none of one soil alone."""
+    found = {}
+    for number, name in enumerate(worlds.kinds if len(worlds.kinds) > 1 else ()):
         own = worlds.kind == number
-        margin = {
+        found[name] = {"probability": float(outcome.met[0, own].mean())} | {
             f"margin_N{ending}": float(quantile_of_worlds(outcome.margin[:, own], q)[0])
             for ending, q in QUANTILES.items()
         }
-        yield SoilOutcome(name, float(outcome.met[0, own].mean()), margin)
+    return found
 
 
 def _remarks(

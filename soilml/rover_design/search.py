@@ -55,6 +55,11 @@ class Designs:
         """Number of designs, k."""
         return len(self.results["probability"])
 
+    @property
+    def columns(self) -> dict[str, Floats]:
+        """Dimensions and results by column name."""
+        return {**self.dimensions, **self.results}
+
     def least_of(self, least: str) -> Floats:
         """What the goal asks to be least, (k,)."""
         if least in self.dimensions:

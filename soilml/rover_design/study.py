@@ -13,7 +13,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.model_settings import take_soil
-from soilml.config.wheeled_rover import GravityByName, RoverWheel, WheeledRover, read_gravity
+from soilml.config.wheeled_rover import GravityByName, RoverWheel, WheeledRover
 from soilml.errors import InputError
 from soilml.io.declared_settings import Numbers, OneOf, in_si, take_declared
 from soilml.io.toml_settings import Settings, read_settings
@@ -231,25 +231,6 @@ def read_study(path: str | os.PathLike[str]) -> DesignStudy:
     return study
 
 
-def with_changes(
-    study: DesignStudy,
-    *,
-    slope: float | None = None,
-    gravity: str | float | None = None,
-    soils: list[str] | None = None,
-    risk: float | None = None,
-) -> DesignStudy:
-    """The study for another slope (rad), gravity, published soils, or risk; None keeps each."""
-    changed: dict[str, Any] = {"slope": slope, "risk": risk}
-    changed = {k: v for k, v in changed.items() if v is not None}
-    study = replace(study, goal=replace(study.goal, **changed))
-    if gravity is not None:
-        study = replace(study, gravity=read_gravity(gravity))
-    if soils is not None:
-        study = replace(study, soil=replace(_published(soils), prior=study.soil.prior))
-    return study
-
-
 def _take_soil(settings: Settings) -> SoilQuestion:
     """One soil as in a model file, `names` of published ones, or `model` with `runs`."""
     if "model" in settings or "runs" in settings:
@@ -264,7 +245,7 @@ def _take_soil(settings: Settings) -> SoilQuestion:
     else:
         names = [settings.text("name")] if "name" in settings else []
     try:
-        entries = dict(_published(names).entries)
+        entries = dict(published_soils(names).entries)
     except InputError as error:
         settings.fail(str(error))
     one = content | ({"name": names[0]} if names else {})
@@ -282,7 +263,8 @@ def _take_soil(settings: Settings) -> SoilQuestion:
     return SoilQuestion(entries, None, prior, tests)
 
 
-def _published(names: list[str]) -> SoilQuestion:
+def published_soils(names: list[str]) -> SoilQuestion:
+    """Published soils, each as likely; `InputError` for a name that there is not."""
     for name in names:
         soil(name)  # raises for one that there is not
     return SoilQuestion({name: soil_catalogue()[name] for name in names})

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
 
 from soilml.arrays import Floats, Integers
+from soilml.report.numbers import parameter_name
 from soilml.rover_design.performance import Outcomes
 from soilml.rover_design.worlds import DrawnWorlds
 
@@ -29,40 +30,17 @@ WORDS = {
     "drawbar_pull": "other errors of the pull",
     "effect": "another law, or a missing effect",
     "lug_shearing": "how far out lugs shear",
-    "cohesion": "cohesion",
-    "friction_angle": "friction angle",
-    "shear_modulus": "shear modulus",
-    "kc": "kc",
-    "kphi": "kphi",
-    "n": "exponent of sinkage",
-    "a0": "angle of maximum stress",
-    "a1": "its growth with slip",
-    "unit_weight": "unit weight",
 }
+_SHEAR = ("cohesion", "friction_angle", "shear_modulus")
+_BEARING = ("kc", "kphi", "n", "bearing", "bearing_by_load")
 #: Tests, what each would determine, and the command that reads it.
 TESTS = {
     "shear and plate tests of the soil that is driven on": (
-        (
-            "soil",
-            "cohesion",
-            "friction_angle",
-            "shear_modulus",
-            "kc",
-            "kphi",
-            "n",
-            "bearing",
-            "bearing_by_load",
-        ),
+        ("soil", *_SHEAR, *_BEARING),
         "soilml bevameter",
     ),
-    "shear tests under the wheel's normal stress, at several loads": (
-        ("cohesion", "friction_angle", "shear_modulus"),
-        "soilml bevameter",
-    ),
-    "plate-sinkage tests with two plates of the wheel's size": (
-        ("kc", "kphi", "n", "bearing", "bearing_by_load"),
-        "soilml bevameter",
-    ),
+    "shear tests under the wheel's normal stress, at several loads": (_SHEAR, "soilml bevameter"),
+    "plate-sinkage tests with two plates of the wheel's size": (_BEARING, "soilml bevameter"),
     "a single wheel's drawbar pull against slip, at two loads": (
         ("contact", "bearing_by_slip", "bearing_by_load", "drawbar_pull", "effect"),
         "soilml import, then soilml gap",
@@ -73,25 +51,20 @@ TESTS = {
 
 @dataclass(frozen=True)
 class VarianceShare:
-    """Share of the variance of a margin that one input explains alone, and its name in words."""
+    """Share of the variance of a margin that inputs explain: one alone, or those of a test.
 
-    name: str
-    text: str
-    share: float
-
-
-@dataclass(frozen=True)
-class PossibleTest:
-    """What a test would find at best: inputs, share of the variance of the margin, the command."""
+    text: The input in words, or the test.
+    command: What reads the test; "" for an input.
+    """
 
     text: str
     inputs: tuple[str, ...]
     share: float
-    command: str
+    command: str = ""
 
     @property
     def left(self) -> float:
-        """Standard deviation that would be left, over that of now."""
+        """Standard deviation that would be left without them, over that of now."""
         return float(np.sqrt(max(1.0 - self.share, 0.0)))
 
 
@@ -112,15 +85,15 @@ def variance_shares(worlds: DrawnWorlds, outcome: Outcomes) -> list[VarianceShar
     Smith, Eur. J. Oper. Res. 226(3), 2013.
     """
     inputs, margin = _inputs(worlds, outcome), _finite(outcome.margin[0])
-    shares = [
-        VarianceShare(name, WORDS[name], _explained([columns], margin, ORDER))
+    return _largest(
+        VarianceShare(
+            WORDS.get(name, parameter_name(name)), (name,), _explained([columns], margin, ORDER)
+        )
         for name, columns in inputs.items()
-    ]
-    shares.sort(key=lambda one: -one.share)
-    return [one for one in shares if one.share >= LEAST_SHARE]
+    )
 
 
-def possible_tests(worlds: DrawnWorlds, outcome: Outcomes) -> list[PossibleTest]:
+def possible_tests(worlds: DrawnWorlds, outcome: Outcomes) -> list[VarianceShare]:
     """Tests by the share of the margin's variance that each would remove at most, largest first.
 
     It would do so if it determined its inputs exactly. Tests of nothing that is uncertain are left
@@ -133,9 +106,14 @@ def possible_tests(worlds: DrawnWorlds, outcome: Outcomes) -> list[PossibleTest]
         if "soil" in names and "soil" not in inputs:
             continue  # of one soil, each test counts for itself
         share = _explained([inputs[name] for name in own], margin, GROUP_ORDER) if own else 0.0
-        if share >= LEAST_SHARE:
-            found.append(PossibleTest(text, tuple(own), share, command))
-    return sorted(found, key=lambda one: -one.share)
+        found.append(VarianceShare(text, tuple(own), share, command))
+    return _largest(found)
+
+
+def _largest(shares: Iterable[VarianceShare]) -> list[VarianceShare]:
+    """Shares of at least `LEAST_SHARE`, the largest first."""
+    kept = [one for one in shares if one.share >= LEAST_SHARE]
+    return sorted(kept, key=lambda one: -one.share)
 
 
 def _inputs(worlds: DrawnWorlds, outcome: Outcomes) -> dict[str, Floats]:
@@ -155,7 +133,7 @@ def _inputs(worlds: DrawnWorlds, outcome: Outcomes) -> dict[str, Floats]:
         del numbers["lug_shearing"]
     for name, values in numbers.items():
         size = float(np.abs(worlds.soil.get(name, values)).max())
-        if name in WORDS and np.ptp(values) > 1e-9 * size:
+        if (name in WORDS or name in soil) and np.ptp(values) > 1e-9 * size:
             inputs[name] = ((values - values.mean()) / values.std())[:, None]
     if worlds.lacking:
         sizes = np.stack([getattr(e, e.about.size) for e in worlds.lacking], axis=1) * worlds.acts

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from soilml.fitting.coordinates import select_free
 from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, ModelledErrors, without_errors
 from soilml.io.read_table import RUNS, read_table
 from soilml.numerics.prior import Prior
+from soilml.numerics.quantiles import latin_hypercube
 from soilml.numerics.smooth_process import SmoothFunctions, process_columns, slip_load_points
 from soilml.parameters import declared, mapped
 from soilml.physics.effects import EFFECTS, Effect
@@ -137,19 +137,19 @@ def draw_worlds(
     normal = _stratified_normal(count, len(names), rng)
     errors = {n: USUAL_MODEL_ERRORS[n] * scale * normal[:, i] for i, n in enumerate(names)}
     lengths = Discrepancy().slip_length, Discrepancy().log_load_length
-    smooth = SmoothFunctions.of(partial(_unit_columns, lengths), lengths, (0.0, slip_limit), LOADS)
+
+    def unit(slip: Floats, load: Floats) -> Floats:
+        return process_columns(slip_load_points(slip, load, *lengths))
+
+    smooth = SmoothFunctions.of(unit, lengths, (0.0, slip_limit), LOADS)
     weights = SMOOTH * scale[:, None, None] * rng.standard_normal((count, 2, smooth.count))
-    lug = LUG_SHEARING[0] + (LUG_SHEARING[1] - LUG_SHEARING[0]) * _stratified(count, rng)
+    lug = Prior(*LUG_SHEARING).at(latin_hypercube(count, 1, rng)[:, 0])
     return DrawnWorlds(
         soil, kind, kinds, errors, scale, lacking, acts, lug, smooth, weights, tuple(remarks)
     )
 
 
 _WHEEL = Wheel(radius=0.1, width=0.1)
-
-
-def _unit_columns(lengths: tuple[float, float], slip: Floats, load: Floats) -> Floats:
-    return process_columns(slip_load_points(slip, load, *lengths))
 
 
 def _soils(
@@ -241,7 +241,7 @@ def _hypotheses(
             share = prior / (len(candidates) * len(SIZES))
             options += [(share, scale, name, std) for name in candidates for std in SIZES]
     ends = np.cumsum([o[0] for o in options])
-    chosen = np.searchsorted(ends / ends[-1], _stratified(count, rng), side="right")
+    chosen = np.searchsorted(ends / ends[-1], latin_hypercube(count, 1, rng)[:, 0], side="right")
     fraction = rng.random(count)
     sizes: dict[str, Floats] = {}
     for number in np.unique(chosen):
@@ -268,13 +268,8 @@ def _acts_on_a_rover(effect: type[Effect]) -> bool:
     return effect.about.kind in ("soil", "wheel") and set(effect.about.needs) <= KNOWN_OF_A_ROVER
 
 
-def _stratified(count: int, rng: np.random.Generator) -> Floats:
-    """Fractions (n,), one in each of n equal intervals, in random order."""
-    return (rng.permutation(count) + rng.random(count)) / count
-
-
 def _stratified_normal(count: int, columns: int, rng: np.random.Generator) -> Floats:
     """Standard normal values (n, columns), stratified in each column."""
     unit = Prior.normal(1.0)
-    parts = [unit.at(_stratified(count, rng)) for _ in range(columns)]
+    parts = [unit.at(latin_hypercube(count, 1, rng)[:, 0]) for _ in range(columns)]
     return np.stack(parts, axis=1) if parts else np.zeros((count, 0))

@@ -81,9 +81,7 @@ class SoilExport(Result):
             "draws": len(self.draws),
             "remarks": [remark.as_json() for remark in self.remarks],
             "written": list(names),
-            "command": origin.command,
-            "soilml_version": origin.version,
-            "files": [{"name": f.name, "bytes": f.size, "sha256": f.sha256} for f in origin.files],
+            **origin.as_json(),
         }
 
     def origin(self, name: str) -> str:
@@ -228,7 +226,8 @@ def export_soil(
     soils = known.drawn(draws, seed) if draws else []
     drawn = tuple(target.values(soil, given) for soil in soils)
     used = {part for own in target.mapped for part in own.soil}
-    kept = tuple(r for r in remarks if not _about_unused(r, used))
+    of_soil = ("not-determined", "not-measured")  # of no interest where the program has no use
+    kept = tuple(r for r in remarks if r.code not in of_soil or used & {*r.about})
     export = SoilExport(target, known, values, drawn, given, kept)
     if out is not None:
         _write(export, Path(out), words)
@@ -241,11 +240,6 @@ def _check_given(target: SoilTarget, given: Mapping[str, float]) -> None:
         if name not in names:
             hint = f"there are: {', '.join(names)}" if names else f"{target.name} asks for none"
             raise InputError(f"--set {name}: {did_you_mean(name, names)}{hint}")
-
-
-def _about_unused(remark: Remark, used: set[str]) -> bool:
-    """Whether a remark concerns only parameters that the program does not take."""
-    return remark.code in ("not-determined", "not-measured") and not used & {*remark.about}
 
 
 def _write(export: SoilExport, folder: Path, words: Sequence[str]) -> None:

@@ -167,23 +167,6 @@ _SDF_SURFACE = """\
   </friction>
 </surface>
 """
-_USD_MATERIAL = """\
-#usda 1.0
-(
-    defaultPrim = "Soil"
-    doc = "Friction of a soil by soilml"
-)
-
-def Material "Soil" (
-    prepend apiSchemas = ["PhysicsMaterialAPI", "PhysxMaterialAPI"]
-)
-{{
-    float physics:staticFriction = {staticFriction:.9g}
-    float physics:dynamicFriction = {dynamicFriction:.9g}
-    float physics:restitution = {restitution:.9g}
-    uniform token physxMaterial:frictionCombineMode = "multiply"
-}}
-"""
 
 
 def _check_gazebo(values: Values) -> None:
@@ -274,36 +257,6 @@ surface.sdf: without the plugin, put <surface> into <collision> of the ground.""
     check=_check_gazebo,
 )
 
-_ISAAC = SoilTarget(
-    name="isaac",
-    program="Isaac Sim and Isaac Lab: a physics material of USD for PhysX",
-    sources=(
-        "https://nvidia-omniverse.github.io/PhysX/physx/5.6.0/_api_build/structPxCombineMode.html",
-        "https://openusd.org/release/api/class_usd_physics_material_a_p_i.html",
-    ),
-    mapped=(_angle("staticFriction", *_TAN), _angle("dynamicFriction", *_TAN)),
-    asked=(
-        AskedParameter("restitution", "1", 0.0, "not measured; the default of USD: no rebound"),
-    ),
-    ignored=dict.fromkeys(
-        ("cohesion", "shear_modulus", "kc", "kphi", "n", "a0", "a1", "unit_weight"),
-        "PhysX has no soil model: the ground is rigid, and friction has no cohesion",
-    ),
-    files={"soil_material{}.usda": _USD_MATERIAL},
-    loading="""\
-Reference soil_material.usda in the stage and bind /Soil to the ground as physics material.
-Give the wheels a friction of 1: the combine mode is multiply, so that the pair has the soil's.
-PhysX takes the later of two modes in the order average, min, multiply, max.
-In Isaac Lab: sim_utils.RigidBodyMaterialCfg(
-    static_friction=..., dynamic_friction=..., friction_combine_mode="multiply")""",
-    lost=(
-        "Only tan(friction_angle) is kept. Sinkage, its resistance, cohesion, and the growth of "
-        "shear stress with slip are lost.",
-        "tan(friction_angle) bounds the pull of a wheel on soil: on this ground rovers climb more "
-        "than on yours. `soilml pull` tells what is left of it at a slip.",
-    ),
-)
-
 _CSV = SoilTarget(
     name="csv",
     program="a table in SI units, for any other program",
@@ -320,6 +273,4 @@ _CSV = SoilTarget(
 )
 
 #: Every target by the name that `--to` takes.
-TARGETS: dict[str, SoilTarget] = {
-    target.name: target for target in (_CHRONO_SCM, _GAZEBO, _ISAAC, _CSV)
-}
+TARGETS: dict[str, SoilTarget] = {target.name: target for target in (_CHRONO_SCM, _GAZEBO, _CSV)}

@@ -9,7 +9,7 @@ import numpy as np
 
 from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
-from soilml.soil_maps.local_soils import LocalSoils, soil_values
+from soilml.soil_maps.local_soils import LocalSoils, lower_root, soil_values
 from soilml.traction.draws import SoilDraws
 from soilml.traction.soil_draws import mixed_prior_draws
 from soilml.traction.vehicle import DrivenVehicle, on_slopes
@@ -97,13 +97,11 @@ class SoilField:
         shares = [s.local for s in self.settings]
         return float(self.weights @ np.asarray(shares))
 
-    def at(self, place: Floats, *, as_read: bool = False) -> tuple[Floats, Floats]:
+    def at(self, place: Floats) -> tuple[Floats, Floats]:
         """Means (n, p) and covariances (n, p, p) of the scores at places (n, 2).
 
         The patch of a place is that of the nearest stretch, or the next one, in the ratio of their
         squared distances: where a change lies between them is not known.
-
-        as_read: Of z + g, the soil that explains readings there with the error of this drive.
         """
         n, p = len(place), self.soils.score.shape[1]
         mean, square = np.zeros((n, p)), np.zeros((n, p, p))
@@ -114,7 +112,7 @@ class SoilField:
             for start in range(0, n, BLOCK):
                 part = slice(start, start + BLOCK)
                 for patch, share in self._patches(place[part]):
-                    m, c = self._given(setting, solved, place[part], patch, as_read)
+                    m, c = self._given(setting, solved, place[part], patch)
                     own = weight * share
                     mean[part] += own[:, None] * m
                     square[part] += own[:, None, None] * (c + m[:, :, None] * m[:, None, :])
@@ -143,7 +141,7 @@ class SoilField:
     def _covariance(self, setting: FieldSetting) -> Floats:
         """Of what the stretches show, (b p, b p)."""
         b, p = self.soils.score.shape
-        shared = _shared(self._same)
+        shared = ACROSS + (1.0 - ACROSS) * self._same
         whole = shared[:, None, :, None] * self.soils.common[:, None]
         between = setting.correlation(self._distance, self._same)
         for j in range(p):
@@ -170,31 +168,17 @@ class SoilField:
         solved: tuple[Floats, Floats],
         place: Floats,
         patch: Integers,
-        as_read: bool,
     ) -> tuple[Floats, Floats]:
         """Means and covariances for one setting."""
         inverse, weights = solved
         p = weights.shape[1]
         same = np.asarray(patch[:, None] == self.soils.patch, dtype=np.float64)
         across = setting.correlation(_distances(place, self.soils.place), same)
-        shared = _shared(same) if as_read else np.zeros_like(same)
-        common = self.soils.common
-        mean = across @ weights + (shared @ weights) @ common
-        covariance = np.broadcast_to(np.eye(p) + as_read * common, (len(place), p, p)).copy()
+        covariance = np.tile(np.eye(p), (len(place), 1, 1))
         for i in range(p):
             for j in range(p):
-                own = [(across, np.eye(p)[:, i]), (shared, common[:, i])]
-                other = [(across, np.eye(p)[:, j]), (shared, common[:, j])]
-                for left, u in own:
-                    for right, v in other:
-                        middle = np.einsum("k,bkcl,l->bc", u, inverse, v)
-                        covariance[:, i, j] -= ((left @ middle) * right).sum(axis=1)
-        return mean, covariance
-
-
-def _shared(same: Floats) -> Floats:
-    """Correlations of the shared error, of places on the same patch or not."""
-    return np.asarray(ACROSS + (1.0 - ACROSS) * same)
+                covariance[:, i, j] -= ((across @ inverse[:, i, :, j]) * across).sum(axis=1)
+        return across @ weights, covariance
 
 
 def _distances(a: Floats, b: Floats) -> Floats:
@@ -238,7 +222,7 @@ def map_ability(
     """
     n, p = mean.shape
     rng = np.random.default_rng(0)
-    root = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+    root = lower_root(covariance)
     own = np.resize(rng.permutation(n), DRAWS)
     draws = mean[own] + np.einsum("kij,kj->ki", root[own], rng.standard_normal((DRAWS, p)))
     names, values = [f.path for f in soils.free], soil_values(soils.free, draws)

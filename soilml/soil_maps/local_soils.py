@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ GAP = 2.0  # Distance within a stretch, in lengths of a stretch, from which on i
 WINDOW, LEAST_WINDOW = 64, 24
 #: Gain of precision over the prior below which a direction counts as not observed.
 LEAST_GAIN = 1e-3
+LEAST_VARIANCE = 1e-10  # Of fractions and scores: sums of draws may round to none
 END = 1e-9  # Least distance of a fraction from 0 and 1
 LEAST_USED = 0.5  # Share of the rows that must be in the range of the file
 UNREAD = (Event.UNUSABLE, Event.STUCK, Event.REPEATED)
@@ -44,7 +45,6 @@ class FollowedRows:
 
     used: NDArray[np.bool_]
     patch: Integers  # Number of changes of soil up to each row
-    remembered: Integers  # Rows that it remembered after each
     unusable: int
 
 
@@ -62,14 +62,6 @@ class LocalSoils:
     score: Floats  # (b, p)
     error: Floats  # Covariances (b, p, p), with sensors and model taken as exact
     common: Floats  # Covariance (p, p) of an error that all stretches share
-    rows: tuple[Integers, ...]  # Of the drive, of each stretch
-
-    def part(self, chosen: NDArray[np.bool_]) -> LocalSoils:
-        """Some of the stretches (b,)."""
-        names = ("place", "station", "patch", "score", "error")
-        own = {name: getattr(self, name)[chosen] for name in names}
-        rows = tuple(self.rows[i] for i in np.flatnonzero(chosen))
-        return replace(self, **own, rows=rows)
 
 
 def follow(
@@ -81,10 +73,9 @@ def follow(
     """
     n, tracker = len(drive.station), SoilTracker(estimator)
     used, change = np.zeros(n, bool), np.zeros(n, bool)
-    remembered, read = np.zeros(n, np.int64), []
+    read = []
     for i in range(n):
         state = tracker.read(**{name: float(values[i]) for name, values in drive.rows.items()})
-        remembered[i] = state.rows_remembered
         if progress is not None:
             progress(i + 1, n)
         if state.event in UNREAD:
@@ -99,7 +90,7 @@ def follow(
             f"{drive.source}: {n - len(read)} of {n} rows are outside the range of "
             f"{estimator.path}, stuck or repeated; check slip, torque_Nm and load_N"
         )
-    return FollowedRows(used, np.cumsum(change), remembered, n - len(read))
+    return FollowedRows(used, np.cumsum(change), n - len(read))
 
 
 def local_soils(
@@ -140,7 +131,7 @@ def local_soils(
         score, error = observation(*moments(estimate, free))
         if done <= len(parts):
             middle = drive.place[part].mean(axis=0), float(drive.station[part].mean())
-            found.append((*middle, followed.patch[part[0]], score, error, part))
+            found.append((*middle, followed.patch[part[0]], score, error))
             continue
         averaged = estimator.run(**rows)
         if averaged.reason == Reason.ESTIMATED and estimate.reason == Reason.ESTIMATED:
@@ -148,11 +139,9 @@ def local_soils(
             shared.append(_excess(whole, error))
     if not found:
         raise FitError(f"{drive.source}: no stretch of {LEAST_ROWS} rows or more has an estimate")
-    arrays = [np.asarray(each) for each in list(zip(*found, strict=True))[:-1]]
-    parts = [one[-1] for one in found]
-    place, station, patch, score, error = arrays
+    place, station, patch, score, error = map(np.asarray, zip(*found, strict=True))
     common = _typical(shared, len(free))
-    return LocalSoils(tuple(free), place, station, patch, score, error, common, tuple(parts))
+    return LocalSoils(tuple(free), place, station, patch, score, error, common)
 
 
 def coordinates(estimator: Estimator) -> list[Coordinate]:
@@ -178,7 +167,7 @@ def moments(estimate: Estimate, free: Sequence[Coordinate]) -> tuple[Floats, Flo
     low = np.asarray([f.prior.lower for f in free])
     width = np.asarray([f.prior.upper for f in free]) - low
     middle = (estimate.mean - low) / width
-    factor = np.linalg.cholesky(estimate.covariance / np.outer(width, width))
+    factor = lower_root(estimate.covariance / np.outer(width, width))
 
     def white(u: Floats) -> Floats:
         return np.asarray(np.linalg.solve(factor, (u - middle).T).T)
@@ -188,6 +177,15 @@ def moments(estimate: Estimate, free: Sequence[Coordinate]) -> tuple[Floats, Flo
     score = ndtri(np.clip(found.u, END, 1.0 - END))
     mean = weights @ score
     return mean, ((score - mean).T * weights) @ (score - mean)
+
+
+def lower_root(covariance: Floats) -> Floats:
+    """Cholesky factors of covariances (..., p, p), of at least `LEAST_VARIANCE` along any axis."""
+    size, axes = np.linalg.eigh(covariance)
+    if size.min() < LEAST_VARIANCE:
+        raised = axes * np.maximum(size, LEAST_VARIANCE)[..., None, :]
+        covariance = raised @ np.swapaxes(axes, -1, -2)
+    return np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
 
 
 def soil_values(free: tuple[Coordinate, ...], score: Floats) -> Floats:
@@ -200,6 +198,7 @@ def soil_values(free: tuple[Coordinate, ...], score: Floats) -> Floats:
 def observation(mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
     """Observation (p,) and its error (p, p), from a posterior whose prior is standard normal."""
     size, axes = np.linalg.eigh(covariance)
+    size = np.maximum(size, LEAST_VARIANCE)
     gain = 1.0 / size - 1.0
     known = gain > LEAST_GAIN
     gain = np.where(known, gain, LEAST_GAIN)
@@ -242,7 +241,7 @@ def _windows(followed: FollowedRows) -> list[Integers]:
 
 def _excess(whole: Floats, own: Floats) -> Floats:
     """The part (p, p) of a covariance beyond another, zero where it is smaller."""
-    root = np.linalg.cholesky(whole)
+    root = lower_root(whole)
     white = np.linalg.solve(root, np.linalg.solve(root, own).T)
     share, axes = np.linalg.eigh(0.5 * (white + white.T))
     rotated = root @ axes
@@ -277,11 +276,6 @@ class MapDrive:
     def of_rows(self, rows: Any) -> dict[str, Floats]:
         """Inputs of an estimator of some rows."""
         return {name: values[rows] for name, values in self.rows.items()}
-
-    def part(self, rows: Any) -> MapDrive:
-        """The drive with some of its rows."""
-        own = self.place[rows], self.station[rows], self.wheel[rows], self.row[rows]
-        return MapDrive(self.of_rows(rows), *own, self.source)
 
 
 def read_map_drive(table: Rows, case: Case) -> MapDrive:

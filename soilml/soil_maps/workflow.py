@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,12 @@ from soilml.io.read_table import Rows
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, QUANTITIES
 from soilml.remarks import Remark
+from soilml.report.numbers import pretty, shown_column
+from soilml.report.page import json_text
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
 from soilml.soil_maps.field import MapAbility, SoilField, map_ability
-from soilml.soil_maps.held_out import HeldOutScore, held_out_score
 from soilml.soil_maps.local_soils import (
     FollowedRows,
     LocalSoils,
@@ -29,14 +33,12 @@ from soilml.soil_maps.local_soils import (
     local_soils,
     read_map_drive,
     soil_values,
-    with_exact_sensors,
 )
-from soilml.soil_maps.raster import MapGrid
+from soilml.soil_maps.raster import MapGrid, geotiff, nav2_files
 from soilml.traction.vehicle import DrivenVehicle
 
-if TYPE_CHECKING:
-    from soilml.report.report import Report
-
+SIZE = (11.0, 8.5)  # Width and height of the four panels, inches
+FILES = ("map.tif", "costmap.yaml", "costmap.pgm", "map.json", "map.png")
 MODEL = "any_wheel"  # Released file that is taken where none is named
 CELL, REACH = 0.5, 2.0  # m
 SIZES = 0.01, 1000.0  # Least and greatest of both, m: a print of a wheel, and a day's drive
@@ -55,7 +57,6 @@ class SoilMap(Result):
     score, covariance: Normal scores of the soil in the k cells that are known, (k, p) and (k, p,
         p).
     ability: The rover straight up slopes; None for a model file without [rover].
-    held_out: How well stretches are predicted that were left out; None for a short drive.
     notes: Remarks on model file and trained file.
     """
 
@@ -68,7 +69,6 @@ class SoilMap(Result):
     score: Floats
     covariance: Floats
     ability: MapAbility | None
-    held_out: HeldOutScore | None
     notes: tuple[Remark, ...] = ()
 
     @cached_property
@@ -90,7 +90,7 @@ class SoilMap(Result):
 
     def bands(self) -> dict[str, Floats]:
         """Grids of the parameters with their standard deviations, and of the rover's slopes."""
-        found = self._soil_columns()
+        found = self._soil_columns(self.moments)
         if (own := self.ability) is not None:
             for j, slope in enumerate(np.rad2deg(own.slope)):
                 found[f"climbs_{slope:g}_deg"] = own.climbed[:, j]
@@ -98,27 +98,83 @@ class SoilMap(Result):
                 found[f"energy_{slope:g}_deg_J_m"] = own.energy[:, j]
         return {name: self.grid.spread(values, self.known) for name, values in found.items()}
 
-    def _soil_columns(self) -> dict[str, Floats]:
+    def _soil_columns(self, moments: tuple[Floats, Floats]) -> dict[str, Floats]:
         """Means and standard deviations (k,) by column."""
         found: dict[str, Floats] = {}
-        mean, std = self.moments
+        mean, std = moments
         for i, coordinate in enumerate(self.soils.free):
             name = QUANTITIES[coordinate.path].column
             found |= {name: mean[:, i], f"{name}_std": std[:, i]}
         return found
 
     def report(self) -> Report:
-        """Where the soil changes, the soil of each patch, slopes, and how well it predicts."""
-        from soilml.soil_maps.presentation import report_of_map
-
-        return report_of_map(self)
+        """Where the soil changes, the soil of each patch, and slopes."""
+        drive = self.drive
+        span = drive.station.max() - drive.station.min()
+        changes = ", ".join(f"{s:.1f}" for s in self.changes)
+        verdict = f"No sharp change of the soil was found along {span:.3g} m."
+        if changes:
+            verdict = f"The soil changes at {changes} m of the path, which is {span:.3g} m long."
+        lines = [
+            f"Within a patch it varies over about {self.field.length:.2g} m."
+            if self.field.local > 0.05 and np.isfinite(self.field.length)
+            else "Within a patch no variation is found."
+        ]
+        wheels = len(np.unique(drive.wheel))
+        return Report(
+            kind="map",
+            verdict=verdict,
+            lines=lines,
+            tables=[_patches(self), *([_slopes(self)] if self.ability is not None else [])],
+            pictures=[
+                Picture(
+                    "Map", partial(_draw_map, self), 2, 2, SIZE, verdict,
+                    "White: the path. Crosses: changes of the soil.",
+                )
+            ],
+            remarks=list(self.remarks()),
+            title="Map of the soil",
+            basis=f"{len(drive.station)} rows of {wheels} wheel{'s' * (wheels > 1)}, "
+            f"{len(self.soils.station)} stretches; {int(self.known.sum())} cells of "
+            f"{self.grid.cell:g} m",
+        )  # fmt: skip
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each known cell: its middle in m, and the soil with standard deviations."""
         centres = self.grid.centres[self.known]
         columns: dict[str, Any] = {"cell": np.flatnonzero(self.known)}
         columns |= {"x_m": centres[:, 0], "y_m": centres[:, 1]}
-        return columns | self._soil_columns()
+        return columns | self._soil_columns(self.moments)
+
+    def as_json(self) -> dict[str, Any]:
+        """Stretches, changes, the settings of the field by weight, and remarks."""
+        soils, field = self.soils, self.field
+        stretches: dict[str, Any] = {"station_m": soils.station, "x_m": soils.place[:, 0]}
+        stretches |= {"y_m": soils.place[:, 1], "patch": soils.patch}
+        stretches |= self._soil_columns(parameter_moments(soils, *field.at(soils.place)))
+        return {
+            "changes_m": self.changes.tolist(),
+            "length_m": field.length,
+            "local_share": field.local,
+            "cell_m": self.grid.cell,
+            "cells": int(self.known.sum()),
+            "stretches": {name: values.tolist() for name, values in stretches.items()},
+            "remarks": [remark.as_json() for remark in self.remarks()],
+        }
+
+    def files(
+        self, folder: Path, epsg: int | None, draw: Callable[[Path], None]
+    ) -> dict[Path, Any]:
+        """Content of each file of the folder of a map; `draw` makes the picture."""
+        binary = {"map.tif": geotiff(self.grid, self.bands(), epsg)}
+        if (occupied := self.occupied) is not None:
+            binary |= nav2_files(self.grid, self.grid.spread(occupied, self.known))
+        files: dict[str, Any] = {
+            name: lambda path, content=content: path.write_bytes(content)
+            for name, content in binary.items()
+        }
+        files |= {"map.json": json_text(self.as_json()), "map.png": draw}
+        return {folder / name: content for name, content in files.items()}
 
     def remarks(self) -> Iterator[Remark]:
         """What to know of the map, by code."""
@@ -138,15 +194,6 @@ class SoilMap(Result):
             yield Remark("not-determined", text, tuple(vague))
         if self.ability is None:
             yield Remark("no-rover", "the model file has no [rover]: soil alone, no slopes")
-        if self.held_out is None:
-            text = "too few stretches to hold some out: how well it predicts is not known"
-            yield Remark("no-score", text)
-        else:
-            for name in ("tracker", "one soil"):
-                gain, error = self.held_out.gain(name)
-                if gain < -2.0 * error:
-                    text = f"on stretches held out, {name} predicts better: do not use the map"
-                    yield Remark("worse-than-simple", text, (name,))
 
 
 def soil_map(
@@ -157,7 +204,6 @@ def soil_map(
     cell: float = CELL,
     reach: float = REACH,
     slopes: Floats | Sequence[float] = SLOPES,
-    score: bool = True,
     progress: Progress | None = None,
 ) -> SoilMap:
     """A map of the soil from the rows of a drive with positions.
@@ -175,8 +221,6 @@ def soil_map(
         Side of a cell, and how far from a reading the soil is said to be known, m.
     slopes
         Rising slopes that the rover is to climb, rad.
-    score
-        Whether stretches are held out to see how well the map predicts them.
     progress
         Function of the stage, of what is done, and of all of it.
 
@@ -206,8 +250,9 @@ def soil_map(
     own = Estimator.load(MODEL) if estimator is None else estimator
     if own.sets is None:
         raise InputError(f"{own.path} has no set posterior; train it with [set_posterior]")
-    alone = case.without_explanations()
-    (own,), notes = estimators_for_case([own], alone, "the model file", pooled=True)
+    (own,), notes = estimators_for_case(
+        [own], case.without_explanations(), "the model file", pooled=True
+    )
     if case.explanations:
         text = (
             "the rover has the effects of each [[explanation]] as likely as it is; the soil is "
@@ -232,23 +277,8 @@ def soil_map(
     ability = None
     if case.rover is not None:
         ability = map_ability(case, soils, mean, covariance, asked)
-    held_out = None
-    if score:
-        tell("predicting stretches held out", 0, 1)
-        held_out = held_out_score(alone, with_exact_sensors(own), drive, followed, soils)
-        tell("predicting stretches held out", 1, 1)
     return SoilMap(
-        drive,
-        followed,
-        soils,
-        field,
-        grid,
-        known,
-        mean,
-        covariance,
-        ability,
-        held_out,
-        tuple(notes),
+        drive, followed, soils, field, grid, known, mean, covariance, ability, tuple(notes)
     )
 
 
@@ -270,3 +300,75 @@ def _within(grid: MapGrid, place: Floats, reach: float) -> NDArray[np.bool_]:
 
     distance, _ = cKDTree(place).query(grid.centres, distance_upper_bound=reach)
     return np.asarray(np.isfinite(distance))
+
+
+def _patches(found: SoilMap) -> ReportTable:
+    """The soil of each patch."""
+    soils, ends, moments = found.soils, [], []
+    for patch in np.unique(soils.patch):
+        own = soils.patch == patch
+        mean, std = parameter_moments(soils, *found.field.at(soils.place[own]))
+        moments.append((mean.mean(axis=0), std.mean(axis=0)))
+        ends.append(f"{soils.station[own].min():.1f} to {soils.station[own].max():.1f}")
+    columns = [Column("patch, m", ends)]
+    for i, coordinate in enumerate(soils.free):
+        values, errors = ([float(own[k][i]) for own in moments] for k in (0, 1))
+        name = coordinate.path.replace("_", " ")
+        columns.append(Column(name, values, QUANTITIES[coordinate.path].unit, errors))
+    return ReportTable("Soil of each patch", columns)
+
+
+def _slopes(found: SoilMap) -> ReportTable:
+    """A row for each slope: cells by the probability of climbing, mean slip and energy."""
+    ability = found.ability
+    assert ability is not None
+    means = []
+    for values in (ability.slip, ability.energy):
+        known = np.isfinite(values)
+        total = np.where(known, values, 0.0).sum(axis=0)
+        means.append((total / np.where(known.any(axis=0), known.sum(axis=0), np.nan)).tolist())
+    likely = [np.mean(ability.climbed > p, axis=0).tolist() for p in (0.5, 0.9)]
+    return ReportTable(
+        "Probability of climbing",
+        [
+            Column("slope", ability.slope.tolist(), "rad", digits=3),
+            Column("cells above 50 %", likely[0], "share", digits=3),
+            Column("above 90 %", likely[1], "share", digits=3),
+            Column("mean slip", means[0], digits=2),
+            Column("work", means[1], "J/m", digits=2),
+        ],
+    )
+
+
+def _draw_map(found: SoilMap, axes: Any) -> None:
+    """Draw friction angle and its uncertainty, the probability of climbing and the slip needed.
+
+    Without a rover, cohesion and its uncertainty are in the place of the last two.
+    """
+    mean, std = found.moments
+    shown: list[tuple[str, Floats, tuple[float | None, float | None]]] = []
+    for i in (1, 0)[: 1 if found.ability is not None else 2]:
+        factor, name = shown_column(QUANTITIES[found.soils.free[i].path].column)
+        shown.append((pretty(name), factor * mean[:, i], (None, None)))
+        shown.append(("its standard deviation", factor * std[:, i], (None, None)))
+    if found.ability is not None and (occupied := found.occupied) is not None:
+        which = f"{np.rad2deg(found.ability.slope[-1]):g} deg"
+        shown.append((f"probability of climbing {which}", 1.0 - occupied, (0.0, 1.0)))
+        shown.append((f"slip needed for {which}", found.ability.slip[:, -1], (0.0, None)))
+    grid = found.grid
+    extent = (grid.west, grid.west + grid.cell * grid.shape[1],
+              grid.south, grid.south + grid.cell * grid.shape[0])  # fmt: skip
+    for panel, (title, values, ends) in zip(np.ravel(axes), shown, strict=True):
+        image = panel.imshow(
+            grid.spread(values, found.known), origin="lower", extent=extent, cmap="viridis",
+            vmin=ends[0], vmax=ends[1], interpolation="nearest",
+        )  # fmt: skip
+        panel.figure.colorbar(image, ax=panel, shrink=0.8)
+        order = np.argsort(found.drive.station)
+        panel.scatter(*found.drive.place[order].T, s=0.5, color="#ffffff", lw=0)
+        for change in found.changes:
+            at = int(np.argmin(np.abs(found.drive.station - change)))
+            panel.plot(*found.drive.place[at], "x", color="#d62728", ms=9, mew=2)
+        panel.set_title(title)
+        panel.set_xlabel("x, m")
+        panel.set_ylabel("y, m")

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
 from soilml.numerics.smooth_process import SmoothFunctions
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import Operating
+from soilml.physics.soils.gravity_law import CHANGED, GravityChange
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,30 @@ class SoilDraws:
         """Some of the draws."""
         errors = None if self.errors is None else self.errors.of_draws(index)
         return SoilDraws(self.names, self.values[index], errors)
+
+    def at_gravity(self, case: Case, change: GravityChange) -> SoilDraws:
+        """The draws with the parameters that they have under another gravity, (n, q).
+
+        Each draw of the soil has a draw of the law, whatever the soil: tests under one gravity do
+        not tell the law. Parameters that change and were not drawn are added. Errors of the model
+        stay.
+
+        Raises `InputError` for a case whose model is another program, whose runs had one gravity,
+        and as `GravityChange.parameters` does.
+        """
+        if change.ratio == 1.0:
+            return self
+        if case.simulator is not None:
+            raise InputError(
+                "the runs of [simulator] had one gravity: let the program run under the other one, "
+                "or take a model file with [gear]"
+            )
+        values = {name: self.values[:, i] for i, name in enumerate(self.names)}
+        values |= {k: np.asarray(case.numbers[k]) for k in CHANGED if k not in values}
+        count = len(self.values)
+        new = change.parameters(values, change.draws(count))
+        columns = [np.broadcast_to(column, count) for column in new.values()]
+        return replace(self, names=tuple(new), values=np.stack(columns, axis=1))
 
     def forces(self, case: Case, draw: NDArray[np.int64], at: Operating, gear: str = "") -> Force:
         """Forces (k,) of a case of one gear, by the draw of each point (k,), with its error.

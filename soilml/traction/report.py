@@ -17,14 +17,7 @@ from soilml.report.numbers import format_quantity, format_range, significant
 from soilml.report.report import Picture, Report
 from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
-from soilml.traction.measured_range import (
-    SAME_LOAD,
-    MeasuredRange,
-)
-from soilml.traction.prediction import (
-    FEWEST,
-    TractionPrediction,
-)
+from soilml.traction.prediction import FEWEST, SAME_LOAD, MeasuredRange, TractionPrediction
 
 STEP = 2  # Tables show every second slip
 _NOTATION = (
@@ -62,10 +55,19 @@ class PullReport(Result):
         ]
 
     def frame_columns(self) -> dict[str, Any]:
-        """Medians and ends of 90 % bands, SI units: a row for each load and slip, or each slope."""
+        """Medians and ends of 90 % bands, SI units: a row for each slope of a rover.
+
+        Of a wheel: a row for each load and slip, with what it does on each slope in all of a load.
+        """
         if self.of_rover:
-            return _slope_columns(self.by_load[0])
-        return _of_loads(self.by_load, _curve_columns)
+            one = self.by_load[0]
+            return _in_all_rows(_slope_columns(one), _vehicle_columns(one))
+        return _of_loads(
+            self.by_load,
+            lambda one: _in_all_rows(
+                _curve_columns(one), _vehicle_columns(one) | _on_each_slope(one)
+            ),
+        )
 
     def report(self, title: str = "Drawbar pull and slopes") -> Report:
         """Largest pull and steepest slope, curves and slopes, and what limits them."""
@@ -165,31 +167,23 @@ def _of_loads(
     return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
 
 
+def _in_all_rows(columns: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """The columns, and further ones of the same number in all rows."""
+    count = len(next(iter(columns.values())))
+    return {**columns, **{name: np.full(count, value) for name, value in numbers.items()}}
+
+
 def _curve_columns(one: TractionPrediction) -> dict[str, Any]:
-    """A row for each slip on level ground; what belongs to the vehicle in all."""
-    known, prior = one.posterior, one.prior
-    count = len(known.curve_slip)
+    """A row for each slip on level ground."""
+    known = one.posterior
     columns: dict[str, Any] = {"slip": known.curve_slip}
     for name, values in (
         ("drawbar_pull_N", known.pull),
         ("tractive_efficiency", known.efficiency),
         ("sinkage_m", known.deepest),
-        ("largest_drawbar_pull_N", known.largest_pull),
-        ("strongest_slip", known.strongest_slip),
-        ("steepest_slope_rad", known.steepest_slope),
+        ("drawbar_pull_N_prior", one.prior.pull),
     ):
-        columns |= {k: np.broadcast_to(v, count) for k, v in band_columns(name, values).items()}
-    for name, values in (
-        ("drawbar_pull_N", prior.pull),
-        ("steepest_slope_rad", prior.steepest_slope),
-    ):
-        band = quantile_band(values)
-        columns[f"{name}_prior_p05"] = np.broadcast_to(band.lower, count)
-        columns[f"{name}_prior_p95"] = np.broadcast_to(band.upper, count)
-    for name, share in zip(
-        ("largest_drawbar_pull", "steepest_slope"), one.remaining_fraction, strict=True
-    ):
-        columns[f"{name}_remaining_fraction"] = np.full(count, share)
+        columns |= band_columns(name, values)
     return columns
 
 
@@ -201,13 +195,42 @@ def _slope_columns(one: TractionPrediction) -> dict[str, Any]:
         ("slip", own.slip),
         ("margin_N", own.margin),
         ("energy_J_per_m", own.energy),
-        ("steepest_slope_rad", own.steepest_slope[:, None] + 0.0 * own.slope),
     ):
         columns |= band_columns(name, draws)
     for name in own.loads if len(own.loads) > 1 else ():
         columns[f"load_N_{name}"] = own.loads[name]
         columns[f"torque_Nm_{name}"] = quantile_band(own.torque[name]).middle
         columns[f"sinkage_m_{name}"] = quantile_band(own.sinkage[name]).middle
+    return columns
+
+
+def _vehicle_columns(one: TractionPrediction) -> dict[str, Any]:
+    """What belongs to the vehicle, numbers."""
+    known, prior = one.posterior, one.prior
+    columns: dict[str, Any] = {}
+    for name, values in (
+        ("largest_drawbar_pull_N", known.largest_pull),
+        ("strongest_slip", known.strongest_slip),
+        ("best_slip", known.best_slip),
+        ("best_efficiency", known.best_efficiency),
+        ("steepest_slope_rad", known.steepest_slope),
+        ("largest_drawbar_pull_N_prior", prior.largest_pull),
+        ("steepest_slope_rad_prior", prior.steepest_slope),
+    ):
+        columns |= band_columns(name, values)
+    pull, slope = one.remaining_fraction
+    columns["largest_drawbar_pull_remaining_fraction"] = pull
+    columns["steepest_slope_remaining_fraction"] = slope
+    return columns
+
+
+def _on_each_slope(one: TractionPrediction) -> dict[str, Any]:
+    """The columns of slopes as one for each slope, numbers."""
+    own, columns = _slope_columns(one), {}
+    for i, slope in enumerate(np.rad2deg(own.pop("slope_rad"))):
+        for name, values in own.items():
+            start, ending, _ = name.partition("_p05" if name.endswith("_p05") else "_p95")
+            columns[f"{start}_at_{slope:g}_deg{ending}"] = values[i]
     return columns
 
 

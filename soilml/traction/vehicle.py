@@ -247,7 +247,7 @@ def on_slopes(
     `performance` does.
     """
     vehicle.check_slopes(slopes)
-    slip = with_first_slips(slip)
+    slip = np.concatenate([np.asarray(FIRST_SHARES) * slip[0], slip])
     on_slope = []
     for slope in slopes:
         curves = wheel_curves(vehicle, draws, float(slope), slip, needed=True)
@@ -263,11 +263,6 @@ def on_slopes(
             }
         )
     return {key: np.stack([one[key] for one in on_slope], axis=-1) for key in on_slope[0]}
-
-
-def with_first_slips(slip: Floats) -> Floats:
-    """The slips (m,) with some below the first."""
-    return np.concatenate([np.asarray(FIRST_SHARES) * slip[0], slip])
 
 
 def performance(

@@ -11,19 +11,21 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.given_case import GivenCase, as_case
 from soilml.fitting.operating_points import operating_points, with_rover_columns
+from soilml.fitting.usable_readings import answered_rows
 from soilml.io.read_table import Rows, as_table
 from soilml.io.table import Table
 from soilml.physics.operating_point import COVARIATES
 from soilml.physics.soils.gravity_law import GravityChange
 from soilml.quantities import CHANNELS, column
-from soilml.traction.gravity import draws_at_gravity
-from soilml.traction.measured_range import (
+from soilml.traction.prediction import (
     MeasuredRange,
     band_content,
+    excluded_effects,
+    gravity_remarks,
     measured_loads,
+    predicted,
     slip_grid,
 )
-from soilml.traction.prediction import excluded_effects, gravity_remarks, predicted
 from soilml.traction.report import PullReport
 from soilml.traction.soil_draws import measured_soil
 from soilml.traction.vehicle import LARGEST_SLOPE, DrivenVehicle
@@ -89,9 +91,9 @@ def pull_report(
     of_rover = case.rover is not None and loads is None
     if of_rover:
         table = with_rover_columns(case, table)
-    soil = measured_soil(case, table, free, exact_model)
-    case, table = soil.case, table.rows(table.answered)
+    whole, (table, _) = table, answered_rows(table)
     measured = MeasuredRange.of(table["slip"], table["load_N"])
+    slip = slip_grid(slip_limit, measured)
     if of_rover:
         vehicles = [_rover(case, table, gravity)]
     else:
@@ -104,12 +106,13 @@ def pull_report(
     asked = np.asarray(asked, dtype=np.float64)
     for one in vehicles:
         one.check_slopes(asked)
-    slip = slip_grid(slip_limit, measured)
+    soil = measured_soil(case, whole, free, exact_model)
+    case, vehicles = soil.case, [replace(one, case=soil.case) for one in vehicles]
     ends = [0.0] if of_rover else [0.0, LARGEST_SLOPE]  # between which the steepest one is sought
     reached = [np.ravel(one.loads(np.append(asked, ends))) for one in vehicles]
     draws, prior = soil.with_errors(slip, np.concatenate(reached).tolist(), CHANNELS)
     if gravity is not None:
-        draws, prior = (draws_at_gravity(case, d, gravity) for d in (draws, prior))
+        draws, prior = (d.at_gravity(case, gravity) for d in (draws, prior))
     found = [predicted(one, draws, prior, asked, slip, measured) for one in vehicles]
     key = column("drawbar_pull")
     pull = table[key] if key in table else np.full(len(table), np.nan)

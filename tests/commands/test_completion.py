@@ -11,14 +11,10 @@ import pytest
 TYPED = {
     "soilml pu": "pull",
     "soilml identify --met": "--method",
-    "soilml identify m.toml --method p": "posterior",
-    "soilml show soils wong1989/dry": "wong1989/dry_sand",
-    "soilml show effects slip-si": "slip-sinkage",
-    "soilml pull m.toml r.csv --gravity m": "moon mars",
     "soilml setup completion f": "fish",
     "soilml identify mo": "model.toml",
     "soilml gap model.toml r.csv --ignore-extra --out mo": "model.toml",
-    "soilml show soils nothing-begins-so": "",
+    "soilml pull --nothing-begins-so": "",
 }
 #: What prints the candidates of some words that are typed.
 ASK = {

@@ -39,7 +39,10 @@ def study(tmp_path):
 
 @pytest.mark.slow
 def test_the_answer_is_json_in_a_pipe(study, capsys):
-    content = json.loads(printed(["plan", "wheels", study, *FEW, "--format", "json"], capsys).out)
+    changed = ["--gravity", "mars", "--risk", "0.2", "--soil", "ding2015/hit_lss1"]
+    words = ["plan", "wheels", study, *FEW, *changed, "--format", "json"]
+    content = json.loads(printed(words, capsys).out)
+    assert content["goal"]["risk"] == 0.2 and content["gravity_m_s2"] < 4.0
     assert content["goal"]["slope_rad"] == pytest.approx(0.05236, abs=1e-5)
     assert content["soils"] == ["ding2015/hit_lss1"]
     assert len(content["designs"]["width"]) == len(content["designs"]["probability"]) == 12

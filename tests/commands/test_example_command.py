@@ -6,6 +6,7 @@ from console import refused, rows_of
 from soilml import gap
 from soilml.cli import main
 from soilml.cli.commands.example import NEXT
+from soilml.rover_design import read_study
 
 
 @pytest.mark.slow
@@ -43,6 +44,8 @@ def test_the_rover_answers_for_slopes_as_a_whole(workplace, capsys):
 
 
 def test_examples_replace_nothing_and_name_each_other(workplace, capsys):
+    assert main(["example", "design", "new"]) == 0
+    assert read_study(workplace / "new/rover.toml").goal.least == "width"
     (workplace / "model.toml").write_text("mine")
     refused(["example", "."], capsys, "model.toml exists; give another folder", workplace)
     assert main(["example", "campain", "x"]) == 2

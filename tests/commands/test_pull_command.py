@@ -48,6 +48,7 @@ def test_curves_picture_and_words_agree_and_hold_the_truth(folder, capsys):
     for name in ("drawbar_pull_N", "steepest_slope_rad"):
         assert (column[f"{name}_prior_p05"] < column[f"{name}_p05"]).all()
         assert (column[f"{name}_p95"] < column[f"{name}_prior_p95"]).all()
+    assert (column["margin_N_at_10_deg_p95"] > column["margin_N_at_15_deg_p05"]).all()
     efficiency = [column[f"tractive_efficiency{end}"] for end in ("_p05", "", "_p95")]
     assert (efficiency[0] < efficiency[1]).all() and (efficiency[1] < efficiency[2]).all()
     true = truth(folder, column["slip"])
@@ -58,3 +59,15 @@ def test_curves_picture_and_words_agree_and_hold_the_truth(folder, capsys):
         said.startswith("At 60 N the wheel pulls ") and "The best slip on level ground is" in said
     )
     assert "torque alone hardly reveals" in said
+
+
+def test_loads_and_slopes_are_refused_before_the_posterior(folder, capsys, monkeypatch):
+    monkeypatch.setattr("soilml.traction.workflow.measured_soil", None)
+    for option, value in (("--load", "60,-5"), ("--slope", "80")):
+        assert main([*COMMAND, option, value]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_one_group_is_one(folder, capsys):
+    assert main([*COMMAND, "--by", "run", "--exact-model"]) == 0
+    assert capsys.readouterr().out.startswith("One group of rows has a prediction.")

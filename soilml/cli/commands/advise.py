@@ -21,8 +21,7 @@ MODEL.toml.
 <parameter>_left is the standard deviation that is expected after a row,
 divided by that of the prior (1: nothing learned), over soils drawn as by
 soilml identify. Rows are the best candidate for all parameters together and
-for each, the best repetition of a measured row, and the best sequence of
---count rows.
+for each, and the best sequence of --count rows.
 
 Candidate channels are those whose noise is declared in [noise]: torque alone,
 and torque with each other channel. Without --load, loads from half to twice

@@ -21,27 +21,11 @@ compared over the soils that it may meet and over typical errors of the model.
   soilml plan wheels ROVER.toml --slope 20 --gravity moon --picture design.png
   soilml plan wheels ROVER.toml --soil ding2015/lunar_soil,mckay1994/jsc-1
 
-ROVER.toml states the rover; no figure of it is assumed. A dimension is a
-number, a range that is searched, or { values = [...] }:
-
-  [rover]
-  mass = 12 # kg
-  wheels = 4
-  wheelbase = 0.4 # m, from the first axle to the last
-  centre_of_mass = [0.0, 0.18] # m: ahead of the middle, above the ground
-  gravity = "earth"
-
-  [wheel]
-  radius = 0.09 # m
-  width = [0.04, 0.12]
-  lug_height = [0.0, 0.015]
-
-  [soil] # as in a model file; or published ones, each as likely
-  names = ["ding2015/hit_lss1", "wang2016/kls1"]
-
-  [goal] # also margin, torque_limit, energy_limit, slip_limit, risk
-  slope = "15 deg"
-  least = "width" # or energy, torque, ...
+ROVER.toml has [rover], [wheel], [soil] and [goal]; `soilml example design
+FOLDER` writes one. No figure of the rover is assumed. A dimension is a number,
+a range that is searched, or { values = [...] }. [goal] may also have margin,
+torque_limit, energy_limit, slip_limit and risk; its `least` is a dimension,
+energy or torque.
 
 The best design meets the goal with the probability 1 - risk and has the least
 of `least`; where none does, it is the likeliest. The margin is the largest
@@ -87,13 +71,18 @@ def run(args: argparse.Namespace) -> int:
 def _study(args: argparse.Namespace) -> DesignStudy:
     """The question of the file, with what the options change."""
     import math
+    from dataclasses import replace
 
-    from soilml.rover_design.study import read_study, with_changes
+    from soilml.config.wheeled_rover import read_gravity
+    from soilml.rover_design.study import published_soils, read_study
 
-    return with_changes(
-        read_study(args.study),
-        slope=None if args.slope is None else math.radians(args.slope),
-        gravity=args.gravity,
-        soils=parse_names(args.soil),
-        risk=args.risk,
-    )
+    study = read_study(args.study)
+    goal, soil = study.goal, study.soil
+    if args.slope is not None:
+        goal = replace(goal, slope=math.radians(args.slope))
+    if args.risk is not None:
+        goal = replace(goal, risk=args.risk)
+    if (names := parse_names(args.soil)) is not None:
+        soil = replace(published_soils(names), prior=soil.prior)
+    gravity = study.gravity if args.gravity is None else read_gravity(args.gravity)
+    return replace(study, goal=goal, soil=soil, gravity=gravity)

@@ -14,6 +14,7 @@ Write an example into a folder, and say which command to run on it.
   soilml example FOLDER               a campaign whose model lacks an effect
   soilml example log FOLDER           the recording of a rig, in its own units
   soilml example rover FOLDER         a rover, and rows of one of its wheels
+  soilml example design FOLDER        a rover whose wheels are to be chosen
 
 and what the source papers measured:
 
@@ -28,6 +29,7 @@ All measurements are simulated, with noise. Existing files are not replaced.
 NEXT = {
     "campaign": "gap {}/model.toml {}/runs.csv --out {}/gap",
     "log": "import --init {}/rig.csv --out {}/map.toml",
+    "design": "plan wheels {}/rover.toml --picture {}/design.png",
     "rover": "pull {}/rover.toml {}/runs.csv --slope 0,10,20",
     "sensor-wheel": "paper sensor-wheel {}/model.toml {}/runs.csv --readings {}/readings.csv",
     "climb": "paper climb {}/rover.toml {}/runs.csv --stress {}/stress.csv",

@@ -22,7 +22,6 @@ FIT.json is the file that `soilml identify --out` wrote, or a model file.
 Targets:
   chrono      Project Chrono, deformable terrain SCM
   gazebo      soil_params.yaml of gz-terramechanics, and friction of SDFormat
-  isaac       physics material for Isaac Sim and Isaac Lab: friction alone
   csv         the parameters in SI units
 
 --draws N adds N soils of the posterior, a file each, for Monte Carlo runs. The
@@ -35,7 +34,7 @@ says where one file hides that a parameter is not determined.
 """
 ARGUMENTS = (
     ("fit FIT.json", "result of identify, or MODEL.toml", InputFile),
-    ("--to TARGET", "chrono, gazebo, isaac or csv", REQUIRED),
+    ("--to TARGET", "chrono, gazebo or csv", REQUIRED),
     ("--out FOLDER", "folder for the files", REQUIRED),
     ("--draws N (0)", "number of soils drawn from the posterior", whole_number_from(0)),
     ("--set NAME=VALUE", "value that rows cannot reveal; can be repeated", REPEATED),

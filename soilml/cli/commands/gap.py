@@ -6,10 +6,10 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from soilml.cli.option_values import named_numbers
 from soilml.cli.options import REPEATED, REQUIRED, folder_outputs
 from soilml.errors import InputError
 from soilml.io.atomic_files import write_files
-from soilml.io.cell_text import read_number
 
 if TYPE_CHECKING:
     from soilml.physics.effects.base import Effect
@@ -71,7 +71,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import origin_of, show_result, tell
     from soilml.cli.progress import progress_bar
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
-    from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
     from soilml.optional_imports import need
 
@@ -82,10 +81,7 @@ def run(args: argparse.Namespace) -> int:
 
     table = read_rows(args, RUNS)
     effects = available_effects(args)
-    if args.gear is not None:
-        case = read_case_of_rows(args, args.model, table, effects, with_explanations=True)
-    else:
-        case = read_case(args.model, effects, with_bias=True, with_explanations=True)
+    case = read_case_of_rows(args, args.model, table, effects, with_explanations=True, several=True)
     print_table_hints(table, case)
     with progress_bar(f"analysing {len(table)} rows", 100) as done:
         report = gap(
@@ -108,20 +104,15 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _calibration(texts: list[str], effects: dict[str, type[Effect]]) -> dict[str, float]:
-    found = {}
-    for text in texts:
-        name, given, value = text.partition("=")
-        kinds = {n for n, e in effects.items() if e.about.kind in ("sensor", "rig")}
-        if name not in kinds or not given:
-            names = f", with one of {', '.join(sorted(kinds))}" if name not in kinds else ""
-            like = f", as in {name}=0.003" if name in kinds else ""
-            raise InputError(f"--checked {text!r}: needed is EFFECT=STD{names}{like}")
-        try:
-            found[name] = read_number(value)
-        except ValueError:
-            found[name] = 0.0
-        if not 0.0 < found[name] < float("inf"):
+    kinds = sorted(n for n, e in effects.items() if e.about.kind in ("sensor", "rig"))
+    found = named_numbers(texts, "--checked", "EFFECT=STD, as in torque-gain=0.003")
+    for name, std in found.items():
+        if name not in kinds:
             raise InputError(
-                f"--checked {text!r}: the standard deviation must be a number above zero"
+                f"--checked {name!r}: needed is EFFECT=STD, with one of {', '.join(kinds)}"
+            )
+        if not 0.0 < std < float("inf"):
+            raise InputError(
+                f"--checked {name}={std:g}: the standard deviation must be a number above zero"
             )
     return found

@@ -69,7 +69,6 @@ def run(args: argparse.Namespace) -> int:
         result_by_group,
         tell_failures,
     )
-    from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
     from soilml.optional_imports import need
 
@@ -78,11 +77,9 @@ def run(args: argparse.Namespace) -> int:
     from soilml.identification.report import fit_report, group_report, soil_entries
 
     table = read_rows(args, RUNS)
-    effects = available_effects(args)
-    if args.gear is not None:
-        case = read_case_of_rows(args, args.model, table, effects, with_explanations=True)
-    else:
-        case = read_case(args.model, effects, with_bias=True, with_explanations=True)
+    case = read_case_of_rows(
+        args, args.model, table, available_effects(args), with_explanations=True, several=True
+    )
     print_table_hints(table, case)
     free = parse_names(args.free)
 

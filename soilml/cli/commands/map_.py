@@ -46,7 +46,7 @@ ARGUMENTS = (
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files of the folder."""
-    from soilml.soil_maps.presentation import FILES
+    from soilml.soil_maps.workflow import FILES
 
     return folder_outputs("--out", args.out, FILES)
 
@@ -64,8 +64,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.onboard.estimator import Estimator
     from soilml.optional_imports import need
     from soilml.soil_maps.local_soils import NEEDED
-    from soilml.soil_maps.presentation import FILES, map_files, map_json
-    from soilml.soil_maps.workflow import CELL, REACH, SLOPES, soil_map
+    from soilml.soil_maps.workflow import CELL, FILES, REACH, SLOPES, soil_map
 
     if args.out is not None:
         need("tifffile", "drive map --out", "map")
@@ -88,8 +87,8 @@ def run(args: argparse.Namespace) -> int:
     report = found.report()
     if args.out is not None:
         folder = Path(args.out)
-        files = map_files(found, folder, args.epsg, report.pictures[0].save)
+        files = found.files(folder, args.epsg, report.pictures[0].save)
         earlier = [folder / name for name in FILES if folder / name not in files]
         write_files(files, folders=[folder], remove=[p for p in earlier if p.exists()])
-    show_result(report, map_json(found))
+    show_result(report, found.as_json())
     return 0

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from soilml.cli.option_values import SLIP
 from soilml.cli.options import OutputFile, gravity_change
 from soilml.errors import InputError
-
-if TYPE_CHECKING:
-    from soilml.traction.report import PullReport
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
@@ -40,8 +36,8 @@ names one wheel.
 changes with it is disputed: by default the law is open, and in the bands.
 
 p05 and p95 are the ends of the 90 % band; `prior` is the band before any
-measurement. The CSV file has a row for each load and slip, of a rover for each
-slope, in SI units.
+measurement. The CSV file has a row for each load and slip, with columns for
+each slope; of a rover a row for each slope. All are in SI units.
 """
 MAX_LOADS = 8  # Largest number of loads
 ARGUMENTS = (
@@ -67,14 +63,17 @@ def run(args: argparse.Namespace) -> int:
 
     from soilml.cli.option_values import parse_names, parse_numbers
     from soilml.cli.options import available_effects
+    from soilml.cli.output import deliver
     from soilml.cli.tables import (
         print_table_hints,
         read_case_of_rows,
         read_rows,
         result_by_group,
+        tell_failures,
     )
     from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
+    from soilml.report.report import by_group
     from soilml.traction import pull_report
 
     if args.picture is not None and args.by is not None:
@@ -103,26 +102,6 @@ def run(args: argparse.Namespace) -> int:
     found, failed = result_by_group(
         args, table, "predicting", lambda rows: pull_report(case, rows, **options)
     )
-    _write_results(args, found, failed)
-    return 0
-
-
-def _write_results(
-    args: argparse.Namespace,
-    found: Mapping[str, PullReport],
-    failed: Mapping[str, str],
-) -> None:
-    """Deliver the results.
-
-    found: Results by group of --by; one under "" without groups.
-    failed: Why other groups have none.
-    """
-    import numpy as np
-
-    from soilml.cli.output import deliver
-    from soilml.cli.tables import tell_failures
-    from soilml.report.report import by_group
-
     parts: list[dict[str, Any]] = []
     for name, one in found.items():
         own = one.frame_columns()
@@ -135,6 +114,8 @@ def _write_results(
         report = replace(reports[""], title=title)
     else:
         verdict = f"{len(found)} groups of rows have a prediction."
+        if len(found) == 1:
+            verdict = "One group of rows has a prediction."
         report = by_group(reports, failed, args.by, verdict, title)
     content = {
         "columns": {name: values.tolist() for name, values in columns.items()},
@@ -143,3 +124,4 @@ def _write_results(
     }
     deliver(args, report, content, columns)
     tell_failures(args.by, failed)
+    return 0

@@ -9,7 +9,7 @@ from soilml import Case, Model, Operating, Table, Wheel, identify, read_case, so
 from soilml.config.measurement_noise import Noise
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
-from soilml.experiment_design import samples_of_prior
+from soilml.experiment_design.parameter_samples import samples_of_prior
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.least_squares import SoilTestTerms
 from soilml.fitting.misfit import problem_under_noise

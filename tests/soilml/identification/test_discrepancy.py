@@ -9,8 +9,8 @@ from remarked import remarked
 from soilml import Operating, identify
 from soilml.config.measurement_noise import Discrepancy, Noise, range_with_zero
 from soilml.config.remainder import Remainder, RemainderPart
-from soilml.experiment_design import samples_of_prior
 from soilml.experiment_design.expected_variance import predicted_readings
+from soilml.experiment_design.parameter_samples import samples_of_prior
 from soilml.fitting.coordinates import select_free
 from soilml.identification.model_error_inputs import with_model_error
 from soilml.io.table import Table

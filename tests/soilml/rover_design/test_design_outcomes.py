@@ -92,7 +92,7 @@ def test_shares_of_a_margin_that_is_known(study):
     outcome = Outcomes(
         margin[None], none, none, none, none, np.full_like(none, np.nan), none, none > 0
     )
-    shares = {one.name: one.share for one in variance_shares(worlds, outcome)}
+    shares = {one.inputs[0]: one.share for one in variance_shares(worlds, outcome)}
     assert shares["friction_angle"] == pytest.approx(0.9, abs=0.02)
     assert shares["contact"] == pytest.approx(0.1, abs=0.02)
     assert "lug_shearing" not in shares and shares.get("shear_modulus", 0.0) < 0.01

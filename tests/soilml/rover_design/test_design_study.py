@@ -6,7 +6,7 @@ import pytest
 from design_files import STUDY
 
 from soilml.errors import InputError
-from soilml.rover_design.study import Dimension, read_study, with_changes
+from soilml.rover_design.study import Dimension, read_study
 
 
 def study_of(tmp_path, text=STUDY):
@@ -48,11 +48,3 @@ def test_what_is_missing_or_wrong_is_one_line(tmp_path, given, instead, said):
     with pytest.raises(InputError, match=said) as caught:
         study_of(tmp_path, STUDY.replace(given, instead))
     assert "\n" not in str(caught.value)
-
-
-def test_options_change_the_question(tmp_path):
-    changed = with_changes(
-        study_of(tmp_path), slope=0.2, gravity="moon", soils=["scott1970/apollo12"], risk=0.2
-    )
-    assert changed.goal.slope == 0.2 and changed.gravity == 1.62 and changed.goal.risk == 0.2
-    assert list(changed.soil.entries) == ["scott1970/apollo12"]

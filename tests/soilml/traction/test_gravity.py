@@ -10,7 +10,6 @@ from soilml import Operating
 from soilml.numerics.quantiles import quantile_band
 from soilml.physics.soils.gravity_law import GravityChange
 from soilml.traction import DrivenVehicle, SoilDraws, performance, pull_report
-from soilml.traction.gravity import draws_at_gravity
 
 EARTH, MOON = 9.80665, 1.62
 SCHOOLS = ("constant", "proportional")
@@ -18,7 +17,7 @@ SCHOOLS = ("constant", "proportional")
 
 def test_draws_are_those_of_a_model_with_the_changed_soil(case):
     draws = SoilDraws(("cohesion", "friction_angle"), np.asarray([[0.0, 0.5], [900.0, 0.6]]))
-    moved = draws_at_gravity(case, draws, GravityChange(EARTH, MOON, "proportional"))
+    moved = draws.at_gravity(case, GravityChange(EARTH, MOON, "proportional"))
     found = performance(DrivenVehicle.of_wheel(case, 20.0), moved, np.zeros(0), np.asarray([0.3]))
     soil = replace(case.soil, kphi=case.soil.kphi * MOON / EARTH)
     soil = replace(soil, cohesion=draws.values[:, 0], friction_angle=draws.values[:, 1])

@@ -8,8 +8,7 @@ from soilml import DrawbarOffset, LoadTransfer, Operating, SlipSinkage
 from soilml.config.case import Case
 from soilml.remarks import texts
 from soilml.traction import DrivenVehicle, SoilDraws, performance, quantile_band
-from soilml.traction.measured_range import MeasuredRange
-from soilml.traction.prediction import predicted
+from soilml.traction.prediction import MeasuredRange, predicted
 
 SLIPS = np.asarray([0.1, 0.3, 0.6])
 EVERYWHERE = MeasuredRange((0.0, 0.99), (1.0, 1e4))

@@ -14,8 +14,7 @@ from soilml.config.wheeled_rover import RoverWheel, WheeledRover
 from soilml.physics.effects import EFFECTS
 from soilml.traction import DrivenVehicle, performance, pull_report
 from soilml.traction.draws import SoilDraws
-from soilml.traction.measured_range import MeasuredRange
-from soilml.traction.prediction import predicted
+from soilml.traction.prediction import MeasuredRange, predicted
 
 NAMES = ("cohesion", "friction_angle", "shear_modulus")
 SOIL = np.asarray([900.0, 0.6, 0.012])
