@@ -26,7 +26,7 @@ targets = ["cohesion", "friction_angle", "shear_modulus"]
 [[regressor]]
 type = "linear"
 [set_posterior]
-designs = 512
+designs = 320
 hidden = 24
 epochs = 40
 """
