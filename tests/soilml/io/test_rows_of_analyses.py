@@ -39,14 +39,13 @@ class Frame:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("made", [dict, Frame], ids=["mapping", "frame"])
 @pytest.mark.parametrize(
-    "answer",
+    ("made", "answer"),
     [
-        lambda rows: identify(CASE, rows, method="nonlinear").values,
-        lambda rows: gap(CASE, rows).as_json()["gap"],
-        lambda rows: audit(CASE, rows, effects={}).as_json(),
-        lambda rows: pull_report(CASE, rows, slip_limit=0.3).by_load[0].posterior.pull,
+        (Frame, lambda rows: identify(CASE, rows, method="nonlinear").values),
+        (dict, lambda rows: gap(CASE, rows).as_json()["gap"]),
+        (Frame, lambda rows: audit(CASE, rows, effects={}).as_json()),
+        (dict, lambda rows: pull_report(CASE, rows, slip_limit=0.3).by_load[0].posterior.pull),
     ],
     ids=["identify", "gap", "audit", "pull"],
 )
