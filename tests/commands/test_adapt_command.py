@@ -26,7 +26,7 @@ targets = ["cohesion", "friction_angle", "shear_modulus"]
 [[regressor]]
 type = "linear"
 [set_posterior]
-designs = 320
+designs = 512
 hidden = 24
 epochs = 40
 """
