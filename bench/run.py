@@ -11,6 +11,7 @@ sys.path[:0] = [str(ROOT / folder) for folder in ("bench", "tests")]
 #: Modules that declare benches, in the order in which they run.
 MODULES = (
     "forward_model",
+    "peers",
     "sets",
     "faults_on_board",
     "model_errors",
