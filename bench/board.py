@@ -53,28 +53,6 @@ def timed(call: Any, count: int = CALLS) -> tuple[float, float]:
     return float(np.median(taken) * 1e6), float(np.quantile(taken, 0.99) * 1e6)
 
 
-def set_feed(estimator: Estimator) -> tuple[list[str], dict[str, np.ndarray]]:
-    """Outputs and inputs of onnxruntime for 16 readings."""
-    sets = estimator.sets
-    assert sets is not None
-    names = [*(SET_PREFIX + name for name in SET_OUTPUTS), *MEMORY_OUTPUTS]
-    return names, sets.feed(sets.rows(readings()), sets.start())
-
-
-def one_reading() -> str:
-    """Microseconds of one reading in the runtime."""
-    estimator = estimator_of("wheel")
-    feed = {n: np.asarray([v], np.float32) for n, v in READING.items()}
-    return f"{timed(lambda: estimator.session.run(OUTPUTS, feed))[0]:.0f} us"
-
-
-def set_of_16(name: str) -> str:
-    """Microseconds of a set of 16 readings in the runtime."""
-    estimator = estimator_of(name)
-    names, feed = set_feed(estimator)
-    return f"{timed(lambda: estimator.session.run(names, feed), CALLS // 8)[0]:.0f} us"
-
-
 def latency_cases(sample: Sample) -> list[Row]:
     """Released files for the recipe's wheel, and for any."""
     calls = QUICK_CALLS if sample.quick else CALLS
@@ -96,7 +74,8 @@ def latency(case: Row) -> Row:
         feed = {n: np.asarray([v], np.float32) for n, v in READING.items()}
         found["onnxruntime"] = timed(lambda: estimator.session.run(OUTPUTS, feed), calls)
     if estimator.sets is not None:
-        names, feed = set_feed(estimator)
+        names = [*(SET_PREFIX + name for name in SET_OUTPUTS), *MEMORY_OUTPUTS]
+        feed = estimator.sets.feed(estimator.sets.rows(many), estimator.sets.start())
         found["set"] = timed(lambda: estimator.session.run(names, feed), some)
         _, memory = estimator.step(estimator.start(), **many)
         found["step"] = timed(lambda: estimator.step(memory, **READING), some)

@@ -183,9 +183,8 @@ def memory(case: Row) -> Row:
         found["tracker"] = sizes["TRACKER", 1]
         found |= {"work 1": sizes["WORK", 1], "work 32": sizes["WORK", 32]}
     if COMPILERS:
-        size, path = call_graph(generated(name), folder() / f"{name}.o").deepest_of_all()
-        other = rf"^.*:|^{name}_|\.(part|constprop|isra).*$"  # file, prefix, variants of gcc
-        found |= {"stack": size, "path": " > ".join(re.sub(other, "", f) for f in path)}
+        graph = call_graph(generated(name), folder() / f"{name}.o")
+        found["stack"] = graph.deepest_of_all()[0]
     if name in (*COMPARED, *SMALL) and not MISSING:  # files of the recipe's wheel, or of any
         context = ANY_WHEEL if name.startswith("any") else None
         rows = rows_of(np.random.default_rng(SEED), ROWS, context, ("sinkage", "drawbar_pull"))
@@ -210,7 +209,6 @@ MEMORY_COLUMNS = {
     "work, --step-rows 1": "work 1",
     "work, --step-rows 32": "work 32",
     "stack here, bytes": "stack",
-    "path": "path",
     "Cortex-M4F, million instructions": "instructions",
     "most": "most",
     "stack there, bytes": "board stack",

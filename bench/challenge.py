@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from runner import Row, table
+from runner import Row, table, with_error
 
 from datagen.blind_sets import BlindSet, Plan, csv_text, draw_blind_set
 from datagen.blind_sets.plans import TIERS_WITHOUT_MECHANISM, benchmark_plans
@@ -43,8 +43,6 @@ CAUSES = (NONE, UNKNOWN, *(n for n, e in EFFECTS.items() if e.applies_to(WHEEL))
 SETS = 24
 #: Smallest probability of a cause, since the logarithmic score of zero is infinite; fewest draws.
 LEAST_PROBABILITY, SUM_TOLERANCE, LEAST_DRAWS = 1e-4, 1e-4, 20
-#: Resamples of the sets, and the ends of the intervals.
-RESAMPLES, ENDS = 4000, (0.05, 0.95)
 
 
 def plans(secret: str) -> Iterator[tuple[Plan, BlindSet]]:
@@ -131,33 +129,22 @@ def scores(probabilities: Any, draws: Any, truth: Row) -> Row:
     return {"causes, ln p": cause} | dict(zip(CHANNELS, ranked, strict=True))
 
 
-def interval(values: Sequence[float]) -> str:
-    """Mean, and the ends of its 90 % interval by resampling of sets.
-
-    All calls resample the same sets, so that differences are paired. Few sets make it too narrow.
-    """
-    own = np.asarray(values)
-    chosen = np.random.default_rng(0).integers(len(own), size=(RESAMPLES, len(own)))
-    low, high = np.quantile(own[chosen].mean(axis=1), ENDS)
-    return f"{own.mean():.2f} [{low:.2f}, {high:.2f}]"
-
-
 def tables(rows: list[Row]) -> str:
-    """Scores of each entry and their 90 % intervals over sets, and differences to the first one.
+    """Scores of each entry with standard errors over sets, and differences to the first one.
 
     The logarithm of the probability of the right cause is better the higher it is; the ranked score
     of readings kept back, in units of the noise, the lower.
     """
-    names = ("causes, ln p", *CHANNELS)
+    columns = {name: with_error(name) for name in ("causes, ln p", *CHANNELS)}
     first = {r["number"]: r for r in rows if r["entry"] == rows[0]["entry"]}
-    columns = {n: lambda own, n=n: interval([r[n] for r in own]) for n in names}
-    apart = {
-        n: lambda own, n=n: interval([r[n] - first[r["number"]][n] for r in own]) for n in names
-    }
-    others = [r for r in rows if r["entry"] != rows[0]["entry"]]
+    others = [
+        row | {name: row[name] - first[row["number"]][name] for name in columns}
+        for row in rows
+        if row["entry"] != rows[0]["entry"]
+    ]
     found = f"{len(first)} sets.\n\n{table(rows, {'entry': 'entry'}, columns)}"
     words = f"\n\nDifferences to {rows[0]['entry']}, paired by set.\n\n"
-    return found + (words + table(others, {"entry": "entry"}, apart) if others else "")
+    return found + (words + table(others, {"entry": "entry"}, columns) if others else "")
 
 
 def make(folder: Path, sealed: Path, count: int = SETS) -> None:

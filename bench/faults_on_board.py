@@ -2,33 +2,57 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
-from faults import (
-    LOAD,
-    SLIP,
-    Fault,
-    Readings,
-    add_noise,
-    definitions,
-    faults,
-    select_rows,
-    shuffled_conditions,
-    simulate,
-)
 from runner import ROOT, Bench, Row, Sample, percent, table
 from wrong_worlds import World
 from wrong_worlds import simulate as simulate_world
 
 from datagen.recipe import read_recipe
-from soilml import Estimator
+from soilml import Estimator, Operating
+from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.onboard.set_contract import SENSOR_ERROR_INPUTS
-from soilml.quantities import SHEAR
+from soilml.parameters import declared
+from soilml.physics.effects import EFFECTS
+from soilml.quantities import SHEAR, column
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
+#: slip, load (N), torque (N m), sinkage (m), drawbar_pull (N): arrays of one shape.
+Readings = dict[str, Floats]
+
+#: Operating conditions: six slips at six loads (N); sets have the first rows of a shuffle of them.
+SLIP = np.repeat([0.08, 0.14, 0.21, 0.29, 0.38, 0.48], 6)
+LOAD = np.tile([40.0, 52.0, 65.0, 79.0, 94.0, 110.0], 6)
+#: Operating conditions that some effects need: speed (m/s), pass in a rut, slip angle (rad).
+EFFECT_CONDITIONS = {"speed": 0.2, "pass_number": 2.0, "slip_angle": 0.2}
+G = 9.80665
+#: Readings of another definition or unit, and of sensors that are off: channel, and what is read.
+READ_AS: dict[str, tuple[str, Callable[[Floats], Floats]]] = {
+    "torque in lbf ft": ("torque", lambda x: 1.356 * x),
+    "torque halved": ("torque", lambda x: 0.5 * x),
+    "slip read as s / (1 - s)": ("slip", lambda x: x / (1.0 - x)),
+    "torque in N mm": ("torque", lambda x: 1e3 * x),
+    "torque in N cm": ("torque", lambda x: 1e2 * x),
+    "torque in kN m": ("torque", lambda x: 1e-3 * x),
+    "torque in kgf m": ("torque", lambda x: x / G),
+    "load in kg": ("load", lambda x: x / G),
+    "load in g": ("load", lambda x: 1e3 * x / G),
+    "load in kN": ("load", lambda x: 1e-3 * x),
+    "slip in percent": ("slip", lambda x: 100.0 * x),
+    "sinkage in mm": ("sinkage", lambda x: 1e3 * x),
+    "sinkage in cm": ("sinkage", lambda x: 1e2 * x),
+    "slip read as 1.1 s": ("slip", lambda x: 1.1 * x),
+    "slip read as s + 0.1": ("slip", lambda x: x + 0.1),
+    "torque + 0.1 N m": ("torque", lambda x: x + 0.1),
+    "torque + 0.2 N m": ("torque", lambda x: x + 0.2),
+}
+#: True radius or width over that of the model file.
+WHEEL_FACTORS = (0.5, 1.0 / 1.5, 0.8, 1.25, 1.5, 2.0)
 
 #: Soils of each line, rows of each set, and the seed of both.
 SETS, ROWS, SEED, QUICK_SETS = 100, 16, 31, 4
@@ -65,16 +89,30 @@ def with_usual_sensor_errors(r: Readings, estimator: Estimator, seed: int) -> Re
 
 
 @cache
-def studied() -> dict[str, Fault]:
-    """All faults by name."""
-    case = read_recipe("wheel").case
-    return {fault.name: fault for fault in (*definitions(), *faults(case))}
+def worlds() -> dict[str, Case]:
+    """True cases by what differs from the model file: the wheel, or an effect that it lacks.
+
+    Each effect that applies to the gear has twice its reference size, or the bound of that.
+    """
+    case, found = read_recipe("wheel").case, {}
+    gear: Any = case.model.gear
+    for key in ("radius", "width"):
+        for factor in WHEEL_FACTORS:
+            true = case.with_values({f"gear.{key}": factor * getattr(gear, key)})
+            found[f"{key} x {factor:.2f}"] = true
+    for name, cls in EFFECTS.items():
+        if cls.applies_to(gear) and name != "torque-offset":
+            key, bound = cls.about.size, declared(cls)[cls.about.size]
+            size = float(np.clip(2.0 * cls.about.reference[key], bound.lower, bound.upper))
+            effect = cls(**{**cls.about.reference, key: size})
+            found[f"{name}, {key} {size:g}"] = replace(case, model=case.model + effect)
+    return found
 
 
 def cases(sample: Sample) -> list[Row]:
     """Sound sets, each fault and each world; the soils are the same."""
     sets = QUICK_SETS if sample.quick else SETS
-    names = [EXACT_SENSORS, USUAL_SENSORS, *studied(), *(world.name for world in WORLDS)]
+    names = [EXACT_SENSORS, USUAL_SENSORS, *READ_AS, *worlds(), *(world.name for world in WORLDS)]
     return [{"fault": name, "sets": sets} for name in (names[:4] if sample.quick else names)]
 
 
@@ -85,14 +123,38 @@ def read(case: Row, estimator: Estimator) -> tuple[Readings, Floats]:
         if world.name == name:
             drives = simulate_world(world, sets, ROWS, SEED)
             return drives.readings, drives.truth
-    rng, fault = np.random.default_rng(SEED), studied().get(name, Fault("no fault"))
+    rng = np.random.default_rng(SEED)
     truth = np.stack([model.prior[key].at(rng.random(sets)) for key in SHEAR], axis=1)
-    order = shuffled_conditions(sets, SEED)[:, :ROWS]
-    true = simulate(fault.case(model), truth, SLIP, LOAD)
-    found = select_rows(fault.report(add_noise(true, model, SEED)), order)
+    found = simulate(worlds().get(name, model), truth)
+    rng = np.random.default_rng(SEED)
+    std = {key: np.asarray(model.noise[column(key)].std(found[key])) for key in CHANNELS[2:]}
+    found |= {key: found[key] + std[key] * rng.standard_normal(std[key].shape) for key in std}
+    if name in READ_AS:
+        channel, of = READ_AS[name]
+        found[channel] = of(found[channel])
+    order = shuffled_conditions(sets)
+    found = {key: np.take_along_axis(values, order, axis=1) for key, values in found.items()}
     if name == USUAL_SENSORS:
         found = with_usual_sensor_errors(found, estimator, SEED)
     return found, truth
+
+
+def simulate(case: Case, theta: Floats) -> Readings:
+    """True readings (sets, conditions) on soils (sets, 3)."""
+    own = case.with_values(dict(zip(case.prior, theta.T[:, :, None], strict=True)))
+    operating = Operating(slip=SLIP, load=LOAD, **EFFECT_CONDITIONS)  # type: ignore[arg-type]
+    force = own.model(own.soil, operating)
+    shape = np.shape(force.torque)
+    given = {"slip": np.broadcast_to(SLIP, shape), "load": np.broadcast_to(LOAD, shape)}
+    return given | {key: np.asarray(getattr(force, key)) for key in CHANNELS[2:]}
+
+
+def shuffled_conditions(sets: int) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """Order (sets, rows) of rows: every slip once, then every slip at another load, ..."""
+    rng = np.random.default_rng(SEED)
+    loads, slips = (rng.permuted(np.tile(np.arange(6), (sets, 6, 1)), axis=2) for _ in range(2))
+    chosen = np.take_along_axis(loads.swapaxes(1, 2), slips, axis=2)  # (sets, round, position)
+    return (6 * slips + chosen).reshape(sets, 36)[:, :ROWS]
 
 
 def flagged(case: Row) -> list[Row]:

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-import board
 import numpy as np
 from conftest import input_box, solved
 from reference import equilibrium
@@ -236,10 +235,7 @@ CALLS: dict[str, tuple[str, Callable[[], str]]] = {
     "`gap` 64 rows of 2 channels, nothing hidden": ("1 s", _gap),
     "`gap` 208 rows of 2 channels, nothing hidden": ("3 s", lambda: _gap(MANY_READINGS)),
     "from import to the first estimate": ("0.2 s", _first_estimate),
-    "one reading on board, onnxruntime, `wheel.onnx`": ("60 us", board.one_reading),
-    "set of 16 on board, onnxruntime, `wheel.onnx`": ("", lambda: board.set_of_16("wheel")),
-    "set of 16 on board, onnxruntime, `any_wheel.onnx`": ("", lambda: board.set_of_16("any_wheel")),
-}  # fmt: skip
+}
 
 
 ACCURACY = Bench(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from soilml.config.case import Case
+from soilml.fitting.candidate_effects import candidate_effects
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.predictions import linearise
@@ -16,7 +17,7 @@ from soilml.gap.identifiability import similarity
 from soilml.inference.constants import SCATTER_UNITS
 from soilml.inference.gaussian_terms import scatter_columns
 from soilml.io.table import Table
-from soilml.physics.effects import EFFECTS, Effect
+from soilml.physics.effects import EFFECTS
 from soilml.quantities import column
 
 #: Correlation lengths of the discrepancy that is counted as noise, in slip and log load: the
@@ -37,15 +38,6 @@ class Separation:
     rival: str
 
 
-def testable_effects(case: Case) -> dict[str, type[Effect]]:
-    """The effects of the catalogue that suit the gears of a case, by name."""
-    if getattr(case, "gears", {}):
-        from soilml.fitting.candidate_effects import candidate_effects
-
-        return candidate_effects(case, EFFECTS)
-    return {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}
-
-
 def separation(case: Case, table: Table, truth: dict[str, Any]) -> Separation:
     """The separation of a set's causes at their true sizes and on the true soil."""
     causes = {cause["name"]: cause for cause in truth["causes"]}
@@ -53,7 +45,7 @@ def separation(case: Case, table: Table, truth: dict[str, Any]) -> Separation:
         return Separation(0.0, 0.0, "")
     true_case = case.with_values(truth["soil"])
     readings = stack_readings(true_case, table)
-    effects = testable_effects(case)
+    effects = candidate_effects(case, EFFECTS)
     columns = {s.name: s.column for s in effect_signatures(true_case, readings, effects)[0]}
     own = _own_signatures(causes, columns, truth, readings)
     free = select_free(case, None)

@@ -5,17 +5,15 @@ Sets are simulated by the reference wheel of blind sets, which shares no code wi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from runner import ROOT, Bench, Row, Sample, each, percent, rms, table
 from scipy.stats import binom
-from wrong_worlds import LAW_WORLDS, NOISE_OF_LOAD, NOISE_OF_SLIP, WORLDS, simulate, unlisted_worlds
+from wrong_worlds import LAW_WORLDS, WORLDS, simulate, unlisted_worlds
 
 from datagen.recipe import read_recipe
 from soilml import Estimator, Table, identify
-from soilml.onboard.estimate import Estimate
 from soilml.onboard.set_contract import COMMON_ERROR_INPUTS, MODEL_ERROR_INPUT
 from soilml.quantities import SHEAR, column
 
@@ -37,10 +35,9 @@ ANSWERS: dict[str, dict[str, float]] = {
     "inferred": {},
 }
 CHANNELS = {"torque": ("torque",), "all channels": ("torque", "sinkage", "drawbar_pull")}
-#: Worlds of each part. Noise of slip and load is declared, to torque alone.
+#: Worlds of each part.
 PARTS = {
     "Wrong sensors, wrong laws": (*WORLDS, *LAW_WORLDS),
-    "Noise of slip and load that is declared": (*NOISE_OF_SLIP, *NOISE_OF_LOAD),
     "Mechanisms of the blind sets that no error describes": unlisted_worlds(),
 }
 KNOWN = {world.name: world for worlds in PARTS.values() for world in worlds}
@@ -73,7 +70,6 @@ def cases(sample: Sample) -> list[Row]:
         | {"seed": sample.of((SEED,))[0]}
         for part, worlds in PARTS.items()
         for name in CHANNELS
-        if name == "torque" or "declared" not in part
         for world in (worlds[:2] if sample.quick else worlds)
     ]
 
@@ -96,39 +92,23 @@ def interval_scores(low: Floats, high: Floats, truth: Floats, std: Floats) -> di
     }
 
 
-def answers(
-    estimator: Estimator, case: Row, declared: bool = True
-) -> tuple[list[Estimate], Floats]:
-    """Estimates of all sets of a world, and the true soils."""
-    world = KNOWN[case["world"]]
-    drives = simulate(world, case["sets"], ROWS, case["seed"])
-    found = []
-    for index in range(case["sets"]):
-        names = ("slip", "load", *CHANNELS[case["channels"]])
-        rows = {key: drives.readings[key][index] for key in names}
-        if declared:
-            rows["slip_std"] = np.full(ROWS, world.slip_std)
-            rows["load_std"] = world.load_std * rows["load"]
-        found.append(estimator.run(**rows))
-    return found, drives.truth
-
-
-def scored(found: Sequence[Estimate], truth: Floats) -> dict[str, Floats]:
-    """Scores of estimates."""
-    low, high = (np.stack([getattr(e, key) for e in found]) for key in ("low", "high"))
-    return interval_scores(low, high, truth, found[0].prior_std)
-
-
 def one_world(case: Row) -> list[Row]:
     """Means over the sets of a world: refusals, coverage and score of each answer."""
     file, rows = Estimator.load(ROOT / "exported" / "wheel.onnx"), []
+    drives = simulate(KNOWN[case["world"]], case["sets"], ROWS, case["seed"])
+    names, truth = ("slip", "load", *CHANNELS[case["channels"]]), drives.truth
     for name, told in ANSWERS.items():
         estimator = file.on(**told)
-        found, truth = answers(estimator, case, declared=name != FIRST)
+        found = [
+            estimator.run(**{key: drives.readings[key][index] for key in names})
+            for index in range(case["sets"])
+        ]
         if name == FIRST:
             found = [e if e.in_range else estimator.prior_estimate() for e in found]
         refused = np.mean([not e.in_range for e in found])
-        means = {k: v.mean(axis=0) for k, v in scored(found, truth).items()}
+        low, high = (np.stack([getattr(e, key) for e in found]) for key in ("low", "high"))
+        scores = interval_scores(low, high, truth, found[0].prior_std)
+        means = {k: v.mean(axis=0) for k, v in scores.items()}
         means["score"] = means["score"].mean()
         error = (np.stack([e.mean for e in found]) - truth) / found[0].prior_std
         means["error"] = rms(error, axis=0)

@@ -18,7 +18,6 @@ from datagen.recipe import read_recipe
 from soilml.cli.progress import progress_bar
 from soilml.errors import InputError
 from soilml.onboard.set_contract import ABSENT_STD
-from soilml.physics.gears import Wheel
 from soilml.processes import process_map
 from soilml.quantities import SHEAR
 from training.set_posterior.families.recipe_family import RecipeFamily
@@ -122,37 +121,6 @@ def stored_posteriors(references: Sequence[ReferenceSet]) -> dict[str, np.ndarra
     if None in rows:
         raise InputError(f"{STORED} is of other sets; compute it again: make limit")
     return {name: np.asarray(stored[name][rows], float) for name in FIGURES}
-
-
-def as_any_wheel_sets(references: Sequence[ReferenceSet]) -> list[ReferenceSet]:
-    """Sets of the reference wheel with the context that a file for any wheel needs.
-
-    The bearing curve is known exactly, and the prior is the same: the coordinates of both families
-    agree.
-    """
-    own, other = (families()[label] for label in (ONE_WHEEL, ANY_WHEEL))
-    assert isinstance(own, RecipeFamily)
-    case, converted = own.recipe.case, []
-    gear = case.model.gear
-    assert isinstance(gear, Wheel)
-    # the ends of the coordinates, not of the prior: they differ in the last bit
-    upper = {axis.name: axis.ends[1] for axis in own.axes}
-    values = {
-        "wheel_radius": gear.radius,
-        "wheel_width": gear.width,
-        "bearing_modulus": case.soil.kc / gear.width + case.soil.kphi,
-        "n": case.soil.n,
-        "bearing_std": 0.0,
-        "cohesion_max": upper["cohesion"],
-        "shear_modulus_max": upper["shear_modulus"],
-    }
-    context = {name: np.asarray([value]) for name, value in values.items()}
-    for reference in references:
-        sets = reference.sets
-        x = np.pad(sets.x, ((0, 0), (0, len(other.axes) - len(own.axes))))
-        sets = replace(sets, context=context, x=x)
-        converted.append(replace(reference, family=other, sets=sets))
-    return converted
 
 
 def with_noise_of_reading(references: Sequence[ReferenceSet]) -> list[ReferenceSet]:

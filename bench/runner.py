@@ -263,6 +263,16 @@ def percent(member: str, digits: int = 0) -> Statistic:
     return each(member, f".{digits}f", scale=100.0)
 
 
+def with_error(member: str) -> Statistic:
+    """Mean, and its standard error."""
+
+    def cell(rows: list[Row]) -> str:
+        means = np.asarray([row[member] for row in rows])
+        return f"{means.mean():.2f} ± {means.std(ddof=1) / np.sqrt(len(means)):.2f}"
+
+    return cell
+
+
 def rms(values: Any, axis: int | None = None) -> Any:
     """Root mean square."""
     return np.sqrt(np.mean(np.square(values), axis=axis))

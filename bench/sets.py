@@ -16,7 +16,6 @@ from reference_sets import (
     COUNT,
     ONE_WHEEL,
     ReferenceSet,
-    as_any_wheel_sets,
     generate_reference_sets,
     stored_posteriors,
     with_noise_of_reading,
@@ -38,17 +37,16 @@ PRIOR_POINTS = 4096
 QUICK_SETS = 4
 ABOUT = (
     "Estimates of the released files against the exact posteriors of the same simulated reference "
-    "sets. `any_wheel` is measured on the reference wheel, as `wheel` is, and over its whole range "
-    "of wheels, loads, soils, bearing parameters, noise and bias. The noise is a share of the true "
-    "value. A file is fed standard deviations that are this share of the reading, as a rover "
-    "computes them. Goals of the files for a microcontroller are those of the full files."
+    "sets. `any_wheel` is measured over its whole range of wheels, loads, soils, bearing "
+    "parameters, noise and bias. The noise is a share of the true value. A file is fed "
+    "standard deviations that are this share of the reading, as a rover computes them. Goals of "
+    "the files for a microcontroller are those of the full files."
 )
 
 
-#: File and its reference sets; those of the reference wheel are given to any wheel's file too.
+#: File and its reference sets.
 FED = {
     f"wheel, {ONE_WHEEL}": ("wheel", ONE_WHEEL),
-    f"any_wheel, {ONE_WHEEL}": ("any_wheel", ONE_WHEEL),
     f"any_wheel, {ANY_WHEEL}": ("any_wheel", ANY_WHEEL),
     f"wheel_small, {ONE_WHEEL}": ("wheel_small", ONE_WHEEL),
     f"any_wheel_small, {ANY_WHEEL}": ("any_wheel_small", ANY_WHEEL),
@@ -85,8 +83,6 @@ def measured(case: Row) -> list[Row]:
     limit = stored_posteriors(plain)
     estimator = Estimator.load(ROOT / "exported" / f"{file}.onnx")
     found, given = [], with_noise_of_reading(plain)
-    if (file, label) == ("any_wheel", ONE_WHEEL):
-        given = as_any_wheel_sets(given)
     for i, reference in enumerate(given):
         estimate = run_file(estimator, reference)
         sets = reference.sets

@@ -5,12 +5,11 @@ Fixed numbers of `soilml.soil_maps` were chosen on drives of other seeds.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from mapped_drives import SLIP_STD, TORQUE_NOISE, simulate_map_drive
-from runner import ROOT, Bench, Row, Sample, each, table
+from runner import ROOT, Bench, Row, Sample, each, table, with_error
 from scipy.special import ndtri
 
 from soilml import Estimator, read_case
@@ -102,16 +101,6 @@ def log_normal(residual: Floats, covariance: Floats) -> Floats:
     white = np.linalg.solve(root, residual[..., None])[..., 0]
     volume = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
     return -0.5 * (white**2).sum(axis=1) - volume - 1.5 * np.log(2.0 * np.pi)
-
-
-def with_error(key: str) -> Callable[[list[Row]], str]:
-    """Mean over drives, and its standard error."""
-
-    def cell(rows: list[Row]) -> str:
-        means = np.asarray([row[key] for row in rows])
-        return f"{means.mean():.2f} ± {means.std(ddof=1) / np.sqrt(len(means)):.2f}"
-
-    return cell
 
 
 def tables(rows: list[Row]) -> str:

@@ -19,7 +19,6 @@ from soilml.report.aligned_text import format_table
 Line = dict[str, str]
 _NAMED, _FALSE = "right cause in the cause set, SNR >= 3, discrepancy", "falsely unique:"
 _HELD, _INTERVAL = "held out between,", "coverage, discrepancy 2%"
-_SET = "set of 16 on board, onnxruntime,"
 #: Figures of the gap workflow that the page shows: their beginnings, and what the page calls them.
 GATES = {
     f"{_NAMED} 0%": "right cause in the set, no smooth error",
@@ -40,9 +39,9 @@ SPEEDS = (
     ("speed", "rigid wheel, driving", 1, "equilibria of a driving wheel in a second", "800,000"),
     ("commands", "`identify` 64 rows, nonlinear", 1, "`identify`, 64 rows, nonlinear", "50 ms"),
     ("commands", "`identify` 64 rows, posterior", 1, "`identify`, 64 rows, posterior", "1 s"),
-    ("commands", "one reading on board", 1, "one reading, `wheel`, onnxruntime", "60 us"),
-    ("commands", f"{_SET} `wheel", 1, "16 readings, `wheel`, onnxruntime", "none"),
-    ("commands", f"{_SET} `any_wheel", 1, "16, `any_wheel`, onnxruntime", "none"),
+    ("board", "wheel.onnx", 3, "one reading, `wheel`, onnxruntime, us", "60"),
+    ("board", "wheel.onnx", 7, "16 readings, `wheel`, onnxruntime, us", "none"),
+    ("board", "any_wheel.onnx", 7, "16, `any_wheel`, onnxruntime, us", "none"),
     ("c", "wheel set of 16, with errors", 4, "16, `wheel`, in C, us", "half of onnxruntime"),
     ("c-memory", "wheel_small", 4, "working memory of `wheel_small` in C, kB", "24"),
 )

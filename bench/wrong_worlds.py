@@ -25,7 +25,7 @@ Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 #: Loads (N) of the drives; slips fill the range of the recipe.
 LOADS = (40.0, 70.0, 100.0)
-#: Least true slip, and least reported slip: what a wheel that hardly slips reports.
+#: Least true slip.
 LEAST_SLIP = 0.003
 
 
@@ -41,12 +41,9 @@ class World:
     rim: float = 0.0  # compliance (m/N) of a rim that lies flat, by the package's own model
     radius: float = 1.0  # true radius over that assumed
     bearing: float = 1.0  # true bearing pressure over that assumed
-    bearing_std: float = 0.0  # of the logarithm of that factor, drawn for each soil
     slip_offset: float = 0.0
     load_gain: float = 0.0
     torque_gain: float = 0.0
-    slip_std: float = 0.0
-    load_std: float = 0.0  # share of the load
     usual: float = 0.0  # size of errors of all kinds, drawn for each soil, over the usual one
 
 
@@ -58,16 +55,13 @@ class SimulatedDrives:
     truth: Floats
 
 
-#: Worlds with errors of sensors, and all worlds, of which the first is sound.
-SENSOR_WORLDS = (
+#: Worlds, of which the first is sound.
+WORLDS = (
+    World("nothing"),
     World("slip + 0.03", slip_offset=0.03),
     World("slip - 0.03", slip_offset=-0.03),
     World("torque gain 5 %", torque_gain=0.05),
     World("load gain 2 %", load_gain=0.02),
-)
-WORLDS = (
-    World("nothing"),
-    *SENSOR_WORLDS,
     World("slip-sinkage, n1 0.3", mechanism=("slip-sinkage", 0.3)),
     World("exit angle, kappa 0.25", mechanism=("exit-angle", 0.25)),
     World("lugs of 10 mm", mechanism=("grousers", 0.01)),
@@ -103,9 +97,6 @@ UNLISTED = (
     "vibration",
     "stick-slip",
 )
-#: Worlds whose noise of slip or load is declared.
-NOISE_OF_SLIP = tuple(World(f"slip std {s:g}", slip_std=s) for s in (0.01, 0.02, 0.04, 0.06))
-NOISE_OF_LOAD = tuple(World(f"load std {s:.0%}", load_std=s) for s in (0.02, 0.05))
 
 
 def mechanisms() -> dict[str, Mechanism]:
@@ -152,9 +143,7 @@ def simulate(world: World, sets: int, rows: int, seed: int) -> SimulatedDrives:
         "slip": np.maximum(slip - world.slip_offset - errors.slip_offset, LEAST_SLIP),
         "load": load / (1.0 + world.load_gain + errors.load_gain),
     }
-    drawn = np.random.default_rng([seed, 2]).standard_normal((sets, 1))
-    bearing = world.bearing * np.exp(world.bearing_std * drawn)
-    bearing = bearing * errors.factor_of_bearing(driven["slip"], driven["load"])
+    bearing = world.bearing * errors.factor_of_bearing(driven["slip"], driven["load"])
     of_soil |= {name: bearing * getattr(case.soil, name) for name in ("kc", "kphi")}
     state = WheelState(
         **{
@@ -179,11 +168,7 @@ def simulate(world: World, sets: int, rows: int, seed: int) -> SimulatedDrives:
         key: value + case.noise[column(key)].std(value) * rng.standard_normal(slip.shape)
         for key, value in true.items()
     }
-    readings["slip"] = np.maximum(
-        slip + world.slip_std * rng.standard_normal(slip.shape), LEAST_SLIP
-    )
-    readings["load"] = load * (1.0 + world.load_std * rng.standard_normal(slip.shape))
-    return SimulatedDrives(readings, truth)
+    return SimulatedDrives(readings | {"slip": slip, "load": load}, truth)
 
 
 def _of_flat_rim(compliance: float, truth: Floats, slip: Floats, load: Floats) -> dict[str, Floats]:

@@ -125,6 +125,22 @@ def _one_session_for_each_file():
         yield
 
 
+#: Files of tests that look at the pictures of pages. Elsewhere these are drawn and not rendered,
+#: which takes half of the time of a report.
+LOOKING = ("test_one_report", "test_reports", "test_climb_command", "test_track_commands",
+           "test_gap_command", "test_comparison")  # fmt: skip
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _pictures_are_rendered_where_a_test_looks(request: pytest.FixtureRequest):
+    from soilml.report import figure_style
+
+    with pytest.MonkeyPatch.context() as patch:
+        if request.path.stem not in LOOKING:
+            patch.setattr(figure_style, "_inline", lambda *_: "<svg></svg>")
+        yield
+
+
 @pytest.fixture
 def model_file(tmp_path: Path) -> Path:
     """The reference wheel as a model file."""

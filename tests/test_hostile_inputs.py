@@ -68,7 +68,7 @@ def with_hostile_entries(values, value, places):
 
 
 def hostile_feeds(session, context, rng):
-    """Each number in each input, in one row, all rows, or for all rows; then many at once."""
+    """Each number in each input, in one row or in all, and for all rows; then many at once."""
     inputs = {i.name: i for i in [*session.get_inputs(), *session.get_overridable_initializers()]}
     for sound in sound_feeds(session, context):
         sizes = {"rows": len(sound["load"]), "kept": 0}
@@ -78,10 +78,10 @@ def hostile_feeds(session, context, rng):
             if name != "joint" and (name != "memory" or name in sound)
         }
         whole = {name: np.asarray(values, np.float32) for name, values in whole.items()}
-        for name, values in whole.items():
-            for value in HOSTILE:
-                for places in (0, slice(None)):
-                    yield sound | {name: with_hostile_entries(values, value, places)}
+        for i, (name, values) in enumerate(whole.items()):
+            for j, value in enumerate(HOSTILE):
+                places = (0, slice(None))[(i + j) % 2]
+                yield sound | {name: with_hostile_entries(values, value, places)}
                 if isinstance(inputs[name].shape[0], str) and name != "memory":
                     yield sound | {name: np.full(1, value, np.float32)}
         for _ in range(MIXTURES):

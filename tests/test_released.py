@@ -103,7 +103,7 @@ STEADY = ((), long(("load_N",)), long(("slip",)), ("slip", "load_N"))
 
 
 @cache
-def runs(recipe_name, rows, steady, count=400):
+def runs(recipe_name, rows, steady, count=240):
     """Columns (runs, rows) of runs in which something is steady."""
     recipe = read_recipe(recipe_name)
     recipe = replace(recipe, blocks=(Block(rows, 1.0, steady),)).sized(rows * count, seed=777)

@@ -15,7 +15,6 @@ HERE, OUT = Path(__file__).parent, Path("demo/papers")
 SCRIPTS = {
     "chains": "rim sensors, climbs, strides and a track: each one command on a log",
     "tracked_robot": "plateaus, what grousers add, and eight groups of pulls",
-    "slip_models": "slip of a wheel-leg from torque and vibration, learned and fused",
     "lunar_lssvm": "what one reading on lunar soil tells",
 }
 

@@ -49,7 +49,8 @@ def pull(case):
 
 
 def rover(case):
-    return pull_report(read_case(ROVER), Table(dict(ROWS)), slopes=np.asarray([0.0, 0.1]))
+    slopes = np.asarray([0.0, 0.1])
+    return pull_report(read_case(ROVER), Table(dict(ROWS)), slopes=slopes, exact_model=True)
 
 
 def imported(case):
