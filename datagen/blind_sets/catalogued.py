@@ -29,9 +29,7 @@ def _grousers(arc: ContactArc, rows: WheelState, height: float) -> ContactArc:
     return replace(arc, shear_radius=arc.shear_radius + out, lever=arc.lever + out)
 
 
-def _bulldozing(
-    reaction: SoilReaction, arc: ContactArc, rows: WheelState, share: float
-) -> SoilReaction:
+def _bulldozing(reaction: SoilReaction, rows: WheelState, share: float) -> SoilReaction:
     """Bekker 1969 with the factors of local shear failure."""
     phi = np.arctan(2.0 / 3.0 * np.tan(rows.friction_angle))
     n_q = np.exp(np.pi * np.tan(phi)) * np.tan(0.25 * np.pi + 0.5 * phi) ** 2
@@ -75,9 +73,7 @@ def _wheel_flexibility(arc: ContactArc, rows: WheelState, compliance: float) -> 
     return substitute_circle(arc, rows, compliance * rows.load)
 
 
-def _shear_softening(
-    points: ContactPoints, arc: ContactArc, rows: WheelState, share: float
-) -> Floats:
+def _shear_softening(points: ContactPoints, rows: WheelState, share: float) -> Floats:
     """Wong's hump, K_r = 0.7 and K_w = 1.5 K, blended in by its share."""
     x, k_r = np.abs(points.shear_displacement) / (1.5 * rows.shear_modulus), 0.7
     height = 1.0 + (1.0 / (k_r * (1.0 - np.exp(-1.0))) - 1.0) * np.exp(1.0 - x)
@@ -86,11 +82,9 @@ def _shear_softening(
     return np.asarray((1.0 - share) * points.shear + share * hump)
 
 
-def _sidewall_shear(
-    reaction: SoilReaction, arc: ContactArc, rows: WheelState, share: float
-) -> SoilReaction:
+def _sidewall_shear(reaction: SoilReaction, rows: WheelState, share: float) -> SoilReaction:
     """The buried halves of both side walls, forward of the axle, each a segment at its centroid."""
-    t, r, phi = arc.entry, rows.radius, rows.friction_angle
+    t, r, phi = reaction.entry, rows.radius, rows.friction_angle
     part = np.maximum(t - np.sin(t) * np.cos(t), 1e-300)
     area = 0.5 * r**2 * part
     y = 2.0 * r * np.sin(t) ** 3 / (3.0 * part)
@@ -102,13 +96,13 @@ def _sidewall_shear(
     return replace(reaction, pull=reaction.pull + both, torque=reaction.torque + both * y)
 
 
-def _depth_cohesion(points: ContactPoints, arc: ContactArc, rows: WheelState, c1: float) -> Floats:
+def _depth_cohesion(points: ContactPoints, rows: WheelState, c1: float) -> Floats:
     j = points.shear_displacement
     mobilised = np.copysign(np.expm1(-np.abs(j) / rows.shear_modulus), j)
     return np.asarray(points.shear + c1 * points.depth * mobilised)
 
 
-def _rate(points: ContactPoints, arc: ContactArc, rows: WheelState, a: float) -> Floats:
+def _rate(points: ContactPoints, rows: WheelState, a: float) -> Floats:
     return np.asarray(points.shear * (1.0 + a * np.log(rows.speed / 0.05)))
 
 
@@ -117,10 +111,10 @@ def _multipass(rows: WheelState, growth: float) -> WheelState:
     return replace(rows, kc=rows.kc * stiffer, kphi=rows.kphi * stiffer)
 
 
-def _lateral_slip(points: ContactPoints, arc: ContactArc, rows: WheelState, share: float) -> Floats:
+def _lateral_slip(points: ContactPoints, rows: WheelState, share: float) -> Floats:
     """Shear grows with both displacements and has the direction of their sum."""
     aside = share * rows.travel_ratio * np.tan(rows.slip_angle)
-    j = np.hypot(points.shear_displacement, arc.shear_radius * points.angle_from_entry * aside)
+    j = np.hypot(points.shear_displacement, points.travel * aside)
     tau = points.strength * -np.expm1(-j / rows.shear_modulus)
     return np.asarray(tau * points.shear_displacement / j)
 
@@ -150,9 +144,7 @@ def _slope_reading(reaction: SoilReaction, rows: WheelState, angle: float) -> So
     return replace(reaction, pull=reaction.pull - rows.load * math.tan(angle))
 
 
-def _load_transfer(
-    reaction: SoilReaction, arc: ContactArc, rows: WheelState, ratio: float
-) -> SoilReaction:
+def _load_transfer(reaction: SoilReaction, rows: WheelState, ratio: float) -> SoilReaction:
     """The soil carries W + ratio DP where W is reported."""
     return replace(reaction, load=reaction.load - ratio * reaction.pull)
 

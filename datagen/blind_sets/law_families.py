@@ -10,13 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from datagen.blind_sets.reference_wheel import (
-    ContactArc,
-    ContactPoints,
-    Floats,
-    Mechanism,
-    WheelState,
-)
+from datagen.blind_sets.reference_wheel import ContactPoints, Floats, Mechanism, WheelState
 
 #: Depth, as a share of that of a firm base, beyond which the soil gives way no further.
 FIRM = 0.995
@@ -30,18 +24,14 @@ def _mobilised(points: ContactPoints, share: Floats) -> Floats:
     return np.copysign(points.strength * share, points.shear_displacement)
 
 
-def _hyperbolic_shear(
-    points: ContactPoints, arc: ContactArc, rows: WheelState, share: float
-) -> Floats:
+def _hyperbolic_shear(points: ContactPoints, rows: WheelState, share: float) -> Floats:
     """Kondner 1963: j / (K + j) in place of an exponential, blended in by its share."""
     j = np.abs(points.shear_displacement)
     hyperbola = _mobilised(points, j / (rows.shear_modulus + j))
     return np.asarray((1.0 - share) * points.shear + share * hyperbola)
 
 
-def _peak_and_decay(
-    points: ContactPoints, arc: ContactArc, rows: WheelState, share: float
-) -> Floats:
+def _peak_and_decay(points: ContactPoints, rows: WheelState, share: float) -> Floats:
     """Wong and Preston-Thomas 1983: (j / K_w) e^(1 - j / K_w), K_w = 2 K, blended in by a share."""
     x = np.abs(points.shear_displacement) / (2.0 * rows.shear_modulus)
     return np.asarray(
@@ -76,9 +66,7 @@ def _firm_base(normal: Floats, depth: Floats, rows: WheelState, nearness: float)
     return np.asarray(normal / (1.0 - share**2))
 
 
-def _curved_envelope(
-    points: ContactPoints, arc: ContactArc, rows: WheelState, loss: float
-) -> Floats:
+def _curved_envelope(points: ContactPoints, rows: WheelState, loss: float) -> Floats:
     """Bolton 1986: the friction angle falls by `loss` (rad) with each tenfold normal stress."""
     decades = np.log10(np.maximum(points.normal, SMALLEST_STRESS) / ENVELOPE_STRESS)
     strength = rows.cohesion + points.normal * np.tan(rows.friction_angle - loss * decades)

@@ -78,7 +78,7 @@ class ContactPoints:
     """Stresses (Pa) at points of the arc; arrays (points, n)."""
 
     theta: Floats  # rad
-    angle_from_entry: Floats  # rad, entry angle less theta
+    travel: Floats  # m, that the shearing rim has turned through since the entry
     depth: Floats  # m, that sets the pressure
     shear_displacement: Floats  # m, shear displacement
     normal: Floats
@@ -88,7 +88,7 @@ class ContactPoints:
 
 @dataclass(frozen=True)
 class SoilReaction:
-    """Load carried (N), drawbar pull (N), torque (N m) and sinkage (m); arrays (n,).
+    """Load carried and drawbar pull (N), torque (N m), sinkage (m), entry angle (rad); (n,) each.
 
     NaN where the soil does not carry the load at any sinkage down to the hub.
     """
@@ -97,6 +97,7 @@ class SoilReaction:
     pull: Floats
     torque: Floats
     sinkage: Floats
+    entry: Floats
 
 
 @final
@@ -125,9 +126,9 @@ class Mechanism:
     shape: Callable[[Floats, Floats, Floats, WheelState, float], Floats] | None = None
     #: normal stress and its depth, (points, n)
     pressure: Callable[[Floats, Floats, WheelState, float], Floats] | None = None
-    shear: Callable[[ContactPoints, ContactArc, WheelState, float], Floats] | None = None
+    shear: Callable[[ContactPoints, WheelState, float], Floats] | None = None
     #: within the search for equilibrium
-    force: Callable[[SoilReaction, ContactArc, WheelState, float], SoilReaction] | None = None
+    force: Callable[[SoilReaction, WheelState, float], SoilReaction] | None = None
     #: from the forces at equilibrium to the readings, for the true slip and load
     reading: Callable[[SoilReaction, WheelState, float], SoilReaction] | None = None
     #: the covariate, a field of `WheelState`, that must vary for the mechanism to have an effect
@@ -205,8 +206,9 @@ def ground_reaction(
         pull=np.sum((points.shear * cos - points.normal * sin) * area, axis=0),
         torque=np.sum(points.shear * arc.lever * area, axis=0),
         sinkage=arc.sinkage,
+        entry=arc.entry,
     )
-    reaction = _changed(reaction, "force", active, arc, rows)
+    reaction = _changed(reaction, "force", active, rows)
     inside = (arc.exit < arc.peak) & (arc.peak < arc.entry)
     return replace(reaction, load=np.where(inside, reaction.load, np.nan))
 
@@ -247,10 +249,11 @@ def _points(
     shear_displacement = arc.shear_radius * (swept_angle - rows.travel_ratio * sine_difference)
     mobilised = -np.expm1(-np.abs(shear_displacement) / rows.shear_modulus)
     shear = strength * np.copysign(mobilised, shear_displacement)
-    points = ContactPoints(theta, swept_angle, depth, shear_displacement, normal, strength, shear)
+    travel = arc.shear_radius * swept_angle
+    points = ContactPoints(theta, travel, depth, shear_displacement, normal, strength, shear)
     for mechanism, size in active:
         if mechanism.shear is not None:
-            points = replace(points, shear=mechanism.shear(points, arc, rows, size))
+            points = replace(points, shear=mechanism.shear(points, rows, size))
     return points
 
 

@@ -40,15 +40,11 @@ def _square(rows: WheelState, n2: float) -> WheelState:
     return replace(rows, n=rows.n + n2 * rows.slip**2)
 
 
-def _root_load(
-    reaction: SoilReaction, arc: ContactArc, rows: WheelState, coefficient: float
-) -> SoilReaction:
+def _root_load(reaction: SoilReaction, rows: WheelState, coefficient: float) -> SoilReaction:
     return replace(reaction, pull=reaction.pull - coefficient * np.sqrt(rows.load))
 
 
-def _depth_power(
-    reaction: SoilReaction, arc: ContactArc, rows: WheelState, coefficient: float
-) -> SoilReaction:
+def _depth_power(reaction: SoilReaction, rows: WheelState, coefficient: float) -> SoilReaction:
     return replace(reaction, pull=reaction.pull - coefficient * reaction.sinkage**1.5)
 
 
@@ -78,16 +74,14 @@ def _growing_shift(arc: ContactArc, rows: WheelState, growth: float) -> ContactA
     )
 
 
-def _rate_power(points: ContactPoints, arc: ContactArc, rows: WheelState, m: float) -> Floats:
+def _rate_power(points: ContactPoints, rows: WheelState, m: float) -> Floats:
     return np.asarray(points.shear * (rows.speed / 0.05) ** m)
 
 
-def _along_velocity(
-    points: ContactPoints, arc: ContactArc, rows: WheelState, share: float
-) -> Floats:
+def _along_velocity(points: ContactPoints, rows: WheelState, share: float) -> Floats:
     """Shear has the direction of the slip velocity at each point, not of the displacement."""
     aside = rows.travel_ratio * np.tan(rows.slip_angle) * share
-    j = np.hypot(points.shear_displacement, arc.shear_radius * points.angle_from_entry * aside)
+    j = np.hypot(points.shear_displacement, points.travel * aside)
     along = 1.0 - rows.travel_ratio * np.cos(points.theta)
     tau = points.strength * -np.expm1(-j / rows.shear_modulus)
     return np.asarray(tau * along / np.hypot(along, aside))
