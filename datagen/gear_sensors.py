@@ -18,7 +18,7 @@ from soilml.physics.gears import Midstance
 from soilml.physics.soils import Soil
 from soilml.quantities import QUANTITIES
 from soilml.systems.wheel_legs.stances import GRAVITY, SpringLeg, vibration_amplitude
-from soilml.systems.wheel_legs.stride_relations import VIBRATION, soil_spring, spring_soil
+from soilml.systems.wheel_legs.stride_relations import SPRING, SPRING_OF_SOIL, VIBRATION, affine
 
 VIBRATION_COLUMN = "vibration_m_s2"
 #: Units of further columns that are no quantity of `soilml.quantities`.
@@ -90,7 +90,7 @@ class StickSlip:
         Without ranges they follow Comin and Saaj 2017, eq. 28.
         """
         if self.stiffness is None or self.drop is None:
-            drop, stiffness = soil_spring(np.asarray(soil.friction_angle), firmness)
+            drop, stiffness = affine(SPRING_OF_SOIL, np.asarray(soil.friction_angle), firmness)
             found = np.broadcast_arrays(drop, stiffness, u[:, 0])
             return {"stiffness": found[1], "increment": found[0]}
         increment = self.drop.at(u[:, 1]) * np.asarray(soil.friction_angle)
@@ -106,7 +106,7 @@ class StickSlip:
         Raises `InputError` for a soil on which that line has no slope.
         """
         if self.stiffness is None:
-            a, b = VIBRATION.line(*spring_soil(leg["increment"], leg["stiffness"]))
+            a, b = VIBRATION.line(*affine(SPRING, leg["increment"], leg["stiffness"]))
             if b.min() < MIN_SLOPE:
                 drop = np.rad2deg(leg["increment"][int(np.argmin(b))])
                 raise InputError(

@@ -22,7 +22,6 @@ from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
 from soilml.numerics.smooth_process import SmoothFunctions
-from soilml.physics.contact import Force
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.quantities import CHANNELS, COLUMNS, QUANTITIES, column
 from soilml.row_status import Status
@@ -117,7 +116,8 @@ def _simulate(recipe: Recipe, piece: Piece) -> tuple[np.ndarray, dict[str, np.nd
         seed = recipe.seed, block
         force = recipe.worlds.forces(case, at, seed, rows.run)
         errors.append(recipe.worlds.errors(recipe.driven, at, seed, rows.run))
-    truth = true_values(rows.slip, rows.load, force)
+    truth = {"slip": rows.slip, "load_N": rows.load}
+    truth |= {column(name): getattr(force, name) for name in CHANNELS}
     for name, error in (pair for own in errors for pair in own.items()):
         truth[name] = truth[name] + error
     sensor_columns: dict[str, Floats] = {}
@@ -264,28 +264,11 @@ def run_fractions(
 
 def _sobol(dimensions: int, seed: tuple[int, ...], skip: int, count: int) -> Floats:
     sequence = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))
-    _skip(sequence, int(skip))
+    if skip:
+        sequence.fast_forward(int(skip))
     with warnings.catch_warnings():  # pieces of a sequence need not be powers of two
         warnings.simplefilter("ignore", UserWarning)
         return np.asarray(sequence.random(int(count)))
-
-
-def _skip(sequence: qmc.Sobol, count: int) -> None:
-    """Do what `sequence.fast_forward(count)` does, in constant time instead of linear.
-
-    Point n of the sequence is the first one with the direction numbers of the bits of the Gray code
-    of n added without carry (Antonov and Saleev 1979, eq. 4).
-    """
-    if not count:
-        return
-    if not (hasattr(sequence, "_sv") and hasattr(sequence, "_quasi")):
-        sequence.fast_forward(count)
-        return
-    last = count - 1
-    for bit in range(last.bit_length()):
-        if (last ^ last >> 1) >> bit & 1:
-            sequence._quasi ^= sequence._sv[:, bit]
-    sequence.num_generated += count
 
 
 def noisy_readings(
@@ -318,14 +301,3 @@ def noisy_readings(
             reading = np.maximum(reading, 1e-3 * true)
         readings[name] = reading
     return readings
-
-
-def true_values(slip: Floats, load: Floats, force: Force) -> dict[str, Floats]:
-    """The true values of the measured columns, (n,), SI."""
-    return {
-        "slip": slip,
-        "load_N": load,
-        "torque_Nm": force.torque,
-        "drawbar_pull_N": force.drawbar_pull,
-        "sinkage_m": force.sinkage,
-    }
