@@ -100,13 +100,6 @@ def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
     without the mechanism: soils without one are drawn again.
 
     Raises `RuntimeError` where no soil of the family carries all rows.
-
-    Examples
-    --------
-    >>> plan = Plan("A", "grousers", 1.0, 0.01, 4, "dry-sand", 3, seed=1)
-    >>> blind_set = draw_blind_set(plan)
-    >>> [cause["name"] for cause in blind_set.truth["causes"]], blind_set.columns["slip"].shape
-    (['grousers'], (64,))
     """
     active: ActiveMechanisms = tuple(
         (c, plan.size * c.reference) for c in active_mechanisms(plan.tier, plan.cause)

@@ -197,19 +197,6 @@ def climbing_ability(
     References
     ----------
     Nagatani et al., section 7.
-
-    Examples
-    --------
-    >>> from soilml.numerics.quantiles import quantile_band
-    >>> from soilml.systems.rim_stress import SimulatedRover, identify_ground
-    >>> true, rng = SimulatedRover(), np.random.default_rng(0)
-    >>> climbs = true.simulate_climbs(rng, np.deg2rad([0.0, 4.0]).tolist(), repeats=2)
-    >>> sand = {"cohesion": 0.0, "friction_angle": 0.6632}
-    >>> ground = identify_ground(true.rover, climbs, fixed=sand)
-    >>> front, rear = true.simulate_artificial_slip(rng)
-    >>> ability = climbing_ability(ground, StressBySlip.fit(front), StressBySlip.fit(rear))
-    >>> round(float(np.rad2deg(quantile_band(ability.steepest).middle)))  # true: 13.2
-    13
     """
     lowest, highest = max(front.lowest, rear.lowest), min(front.highest, rear.highest)
     if not lowest < highest:

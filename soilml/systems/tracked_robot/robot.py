@@ -99,13 +99,6 @@ def grouser_pull(
     along the belt, where the paper multiplies it by another cosine. Soil between grousers has no
     cohesion here, unlike in the effect `track-grousers`, which is the mean over all places with
     f_g = tan(phi).
-
-    Examples
-    --------
-    >>> from soilml import soil
-    >>> twelve = DiscreteGrousers(pitch=0.05, tip=0.01, friction=0.6, yielding=0.1)
-    >>> round(float(grouser_pull(WANG2018, soil("wang2018/clay"), 0.7, twelve).mean()), -1)
-    740.0
     """
     at = Operating(slip=np.asarray([slip]), load=np.asarray([robot.load]))
     model, track = Model(robot.track, effects), robot.track
@@ -161,14 +154,6 @@ def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -
     References
     ----------
     Wang et al. 2018, eqs. 3, 8 and 9, in which the tensions at the joints cancel.
-
-    Examples
-    --------
-    >>> from soilml import Model, Operating, soil
-    >>> at = Operating(slip=0.2, load=WANG2018.load)
-    >>> balance = track_balance(Model(WANG2018.track), soil("wang2018/sand"), at)
-    >>> [round(float(balance[f"{part}_share"]), 2) for part in ("front", "belt", "rear")]
-    [0.14, 0.8, 0.05]
     """
     track = track_of(model)
     belt = track.contact_geometry(model(soil, at).sinkage, soil, at)

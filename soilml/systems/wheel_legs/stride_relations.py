@@ -99,12 +99,6 @@ class StrideRelation(SlipLine):
 
         Raises `InputError` for pairs that are not valid, `FitError` if they do not determine the
         soil or the estimate is not physical.
-
-        Examples
-        --------
-        >>> found = TORQUE.soil(1.1, 0.25)
-        >>> [round(float(np.rad2deg(v))) for v in (found.mean[0], found.std[0])]  # degrees
-        [40, 6]
         """
         x, i = (np.atleast_1d(np.asarray(v, float)) for v in (reading, slip))
         _check_pairs(x, i)
