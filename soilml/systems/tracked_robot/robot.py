@@ -15,7 +15,7 @@ from soilml.io.table import Table
 from soilml.physics.contact import stress
 from soilml.physics.effects import Effect, ShearSoftening, TrackGrousers
 from soilml.physics.gears import Track
-from soilml.physics.gears.track_belt import FRONT, MIDDLE, REAR, distance_along
+from soilml.physics.gears.track_belt import belt_arcs
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
@@ -158,11 +158,10 @@ def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -
     track = track_of(model)
     belt = track.contact_geometry(model(soil, at).sinkage, soil, at)
     profile = model.profile(soil, at, points)
-    front_end, _ = distance_along(belt, FRONT, -belt.leave)
-    middle_end, _ = distance_along(belt, MIDDLE, belt.meet)
-    step = distance_along(belt, REAR, -belt.exit)[0] / (points - 1)
+    _, middle, last = belt_arcs(belt)
+    step = last.distance(-belt.exit)[0] / (points - 1)
     way = step * np.arange(points).reshape(-1, *[1] * np.ndim(step))
-    front, rear = way < front_end, way > middle_end
+    front, rear = way < middle.along, way > last.along
     weight = np.full_like(way, 1.0) * step
     weight[[0, -1]] *= 0.5
     lift = profile.normal * np.cos(profile.angle) + profile.shear * np.sin(profile.angle)
