@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.blind_sets.catalogued import RIG_MECHANISMS, SENSOR_MECHANISMS
 from datagen.blind_sets.plans import Plan, active_mechanisms
 from datagen.blind_sets.reading_errors import (
     AUTOCORRELATION,
@@ -24,6 +23,7 @@ from datagen.blind_sets.reading_errors import (
     simulate_readings,
 )
 from datagen.blind_sets.reference_wheel import (
+    MECHANISMS,
     ActiveMechanisms,
     Floats,
     Mechanism,
@@ -59,6 +59,8 @@ SCATTER = ("friction_angle_offset_rad", "modulus_factor")  # Its members in the 
 #: belong to its rim.
 GEARS = ("wheel_a", "wheel_b")
 MECHANISMS_OF_ONE_GEAR = ("grousers",)
+#: Mechanisms of rig and sensors, which do not act on a vehicle.
+OF_THE_RIG = {"slope", "load-transfer", "bearing-friction", *MECHANISMS["S"]}
 #: Smallest sinkage with the discrepancy, over that without: a wheel on soil sinks.
 LEAST_SINKAGE = 0.3
 ATTEMPTS = 50  # Soils tried before a plan is given up
@@ -151,6 +153,7 @@ def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
     if plan.timed:
         for d, table in zip((runs, region, between), tables, strict=True):
             table["time_s"] = _times(d)
+    of_a_vehicle = tuple((m, size) for m, size in active if m.name not in OF_THE_RIG)
     truth = {
         "plan": asdict(plan),
         "causes": [
@@ -190,7 +193,7 @@ def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
             "load_N": beyond.load.tolist(),
             "covariates": {name: float(v[0]) for name, v in beyond.covariates.items()},
             "true": _by_channel(
-                _sum(replace(world, active=_of_a_vehicle(active)).channels(beyond), extra[3])
+                _sum(replace(world, active=of_a_vehicle).channels(beyond), extra[3])
             ),
         },
     }
@@ -266,12 +269,6 @@ def _draw_scatter(
     phi = SCATTER_PHI * generator.standard_normal(runs) * size
     k = np.exp(SCATTER_K * generator.standard_normal(runs) * size)
     return dict(zip(SCATTER, (phi.tolist(), k.tolist()), strict=True))
-
-
-def _of_a_vehicle(active: ActiveMechanisms) -> ActiveMechanisms:
-    """The mechanisms of soil and gear, which act on a vehicle too."""
-    of_rig = {m.key for m in (*RIG_MECHANISMS, *SENSOR_MECHANISMS)}
-    return tuple((m, size) for m, size in active if m.key not in of_rig)
 
 
 def _times(schedule: RunSchedule) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar, final
 
 import numpy as np
@@ -103,41 +103,50 @@ class SoilReaction:
 @final
 @dataclass(frozen=True)
 class Mechanism:
-    """A mechanism: its name, the form of its law, its size and the stages at which it acts.
+    """A mechanism: its name, its size with a reference value and unit, and what it does.
 
-    Each function takes the value of its stage, the states that the value belongs to, and last the
-    size of the mechanism in `unit`; None at stages where it does not act. `form` names a law that
-    differs from that of the analyst's effect of the same name; it is empty where they agree.
+    acts: Function by stage, in the order in which they run. Each takes the value of its stage, the
+        states that the value belongs to, and last the size. `driven`: from reported to true slip
+        and load. `soil`: the soil under this wheel. `arc`. `shape`: normal stress, the way from
+        either end of the contact (0) to its largest stress (1), and that largest stress; (points,
+        n) but the last, (n,). `pressure`: normal stress and its depth, (points, n). `shear`: from
+        the points of the contact. `force`: within the search for equilibrium. `reading`: from the
+        forces at equilibrium to the readings, for the true slip and load.
+    form: Names a law that differs from that of the analyst's effect of the same name.
+    needs: The covariate, a field of `WheelState`, that must vary for it to have an effect.
     """
 
     name: str
     size: str
     reference: float
     unit: str
-    _: KW_ONLY
+    acts: dict[str, Callable[..., Any]]
     form: str = ""
-    #: from reported to true slip and load
-    driven: Callable[[WheelState, float], WheelState] | None = None
-    #: the soil under this wheel
-    soil: Callable[[WheelState, float], WheelState] | None = None
-    arc: Callable[[ContactArc, WheelState, float], ContactArc] | None = None
-    #: normal stress, the way from either end of the contact (0) to its largest stress (1), and that
-    #: largest stress; (points, n) but the last, (n,)
-    shape: Callable[[Floats, Floats, Floats, WheelState, float], Floats] | None = None
-    #: normal stress and its depth, (points, n)
-    pressure: Callable[[Floats, Floats, WheelState, float], Floats] | None = None
-    shear: Callable[[ContactPoints, WheelState, float], Floats] | None = None
-    #: within the search for equilibrium
-    force: Callable[[SoilReaction, WheelState, float], SoilReaction] | None = None
-    #: from the forces at equilibrium to the readings, for the true slip and load
-    reading: Callable[[SoilReaction, WheelState, float], SoilReaction] | None = None
-    #: the covariate, a field of `WheelState`, that must vary for the mechanism to have an effect
     needs: str = ""
 
     @property
     def key(self) -> str:
         """Name and form: slip-sinkage, slip-sinkage/lyasko."""
         return f"{self.name}/{self.form}" if self.form else self.name
+
+
+#: Tier -> mechanism by its key. A: textbook form, soil, wheel and rig; B: alternative form; C: in
+#: no catalogue of the analyst; S: sensors; L: another law of the soil; T: a soil that changes.
+MECHANISMS: dict[str, dict[str, Mechanism]] = {tier: {} for tier in "ABCSLT"}
+Act = TypeVar("Act", bound=Callable[..., Any])
+
+
+def mechanism(
+    tier: str, name: str, size: str, reference: float, unit: str, stage: str, **more: str
+) -> Callable[[Act], Act]:
+    """Declare what a mechanism of a tier does at one stage; `more` are its form and its needs."""
+
+    def declared(act: Act) -> Act:
+        own = Mechanism(name, size, reference, unit, {}, **more)
+        MECHANISMS[tier].setdefault(own.key, own).acts[stage] = act
+        return act
+
+    return declared
 
 
 #: Mechanisms that act together, each with its size.
@@ -171,7 +180,7 @@ def solve_equilibrium(rows: WheelState, active: ActiveMechanisms = ()) -> SoilRe
 def _changed(value: State, stage: str, active: ActiveMechanisms, *of: Any) -> State:
     """The value of a stage after all mechanisms that act there; `of` are the states it is of."""
     for mechanism, size in active:
-        if (act := getattr(mechanism, stage)) is not None:
+        if act := mechanism.acts.get(stage):
             value = act(value, *of, size)
     return value
 
@@ -238,12 +247,12 @@ def _points(
     modulus = rows.kc / rows.width + rows.kphi
     normal = modulus * depth**rows.n
     for mechanism, size in active:
-        if mechanism.shape is not None:
+        if shape := mechanism.acts.get("shape"):
             front = arc.entry - arc.peak
             deepest = _cosine_difference(arc.peak, front, arc.entry) * arc.radius
-            normal = mechanism.shape(normal, WAY, modulus * deepest**rows.n, rows, size)
-        if mechanism.pressure is not None:
-            normal = mechanism.pressure(normal, depth, rows, size)
+            normal = shape(normal, WAY, modulus * deepest**rows.n, rows, size)
+        if pressure := mechanism.acts.get("pressure"):
+            normal = pressure(normal, depth, rows, size)
     strength = rows.cohesion + normal * np.tan(rows.friction_angle)
     sine_difference = 2.0 * np.cos(0.5 * (arc.entry + theta)) * np.sin(0.5 * swept_angle)
     shear_displacement = arc.shear_radius * (swept_angle - rows.travel_ratio * sine_difference)
@@ -252,8 +261,8 @@ def _points(
     travel = arc.shear_radius * swept_angle
     points = ContactPoints(theta, travel, depth, shear_displacement, normal, strength, shear)
     for mechanism, size in active:
-        if mechanism.shear is not None:
-            points = replace(points, shear=mechanism.shear(points, rows, size))
+        if sheared := mechanism.acts.get("shear"):
+            points = replace(points, shear=sheared(points, rows, size))
     return points
 
 
