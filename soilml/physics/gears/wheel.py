@@ -85,7 +85,10 @@ class Wheel(RigidWheel):
             return flat_rim_contact(geometry, at, self.braking, nodes)
         driving, braking = NODES[resolution]
         if brakes and resolution is not Resolution.COARSE:
-            return _braking_contact(geometry, at, self.braking, braking)
+            inner = _braking_part_ends(geometry, 1.0 - geometry.travelled(at.slip, self.braking))
+            angle, arc = between(geometry.exit, inner, geometry.entry, braking)
+            depth = pressed_depth(geometry, angle)
+            return contact_at(geometry, at, geometry.entry - angle, depth, arc, self.braking)
         return _two_part_contact(geometry, at, self.braking, driving)
 
     def profile_contact(
@@ -94,15 +97,11 @@ class Wheel(RigidWheel):
         """Evenly spaced points from entry to exit, without area; of the middle of the width."""
         xp = namespace(geometry.entry)
         fraction = xp.linspace(0.0, 1.0, points, dtype=geometry.entry.dtype)[:, None]
-        arc = geometry.entry - geometry.exit
+        passed = fraction * (geometry.entry - geometry.exit)
+        angle, none = geometry.entry - passed, xp.zeros_like(passed)
         if geometry.chord is not None:
-            angle = geometry.entry - fraction * arc
-            none = xp.zeros_like(angle)
             return angle, flat_rim_points(geometry, at, self.braking, angle, none)
-        passed = fraction * arc
-        angle = geometry.entry - passed
         depth = pressed_depth(geometry, angle)
-        none = xp.zeros_like(passed)
         return angle, contact_at(geometry, at, passed, depth, none, self.braking)
 
 
@@ -121,17 +120,11 @@ def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int)
     return contact_at(rim, at, passed, xp.concat([depth, depth], axis=0), arc, law)
 
 
-def _braking_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) -> Contact:
-    """Parts that end where shear displacement changes its direction and the shear curve bends."""
-    inner = _braking_part_ends(rim, 1.0 - rim.travelled(at.slip, law))
-    angle, arc = between(rim.exit, inner, rim.entry, count)
-    return contact_at(rim, at, rim.entry - angle, pressed_depth(rim, angle), arc, law)
-
-
 def _braking_part_ends(rim: WheelArc, slip: Array) -> list[Array]:
     """Angles (rad) between exit and entry that bound the parts of a braking wheel's contact.
 
-    They are the maximum stress and the reversal of shear displacement; a second
+    Parts end where shear displacement changes its direction and the shear curve bends: at the
+    maximum stress and the reversal of shear displacement; a second
     reversal is added if any row has one, where the rim reaches far behind the axle. Rows
     without a reversal take an angle that divides the longer part, or the lowest, in halves, or one
     close to the entry where the wheel is nearly locked. `slip` is that of the shear displacement.
