@@ -220,6 +220,9 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
         settings.fail(
             f"[noise] {VIBRATION_COLUMN}: the table [stick_slip] is missing, which adds it"
         )
+    content = settings.content
+    if case.simulator is not None:  # with its runs, so that it needs no other file
+        content = content | {"simulator": case.simulator.within()}
     return Recipe(
         case=case,
         slip=slip,
@@ -230,7 +233,7 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
         blocks=_take_blocks(settings),
         rows=settings.count("rows"),
         seed=int(settings.take("seed", int, "a whole number, 0 or more")),
-        content=_self_contained(settings.content, case),
+        content=content,
         worlds=worlds,
     )
 
@@ -246,13 +249,6 @@ def _check_simulated(operating: Settings, gear: Gear, slip: Prior, load: Prior) 
                 f"{column(name)} is [{own.lower:g}, {own.upper:g}]; the runs of the simulator have "
                 f"{gear.lower[i]:g} to {gear.upper[i]:g}: narrow it, or simulate more"
             )
-
-
-def _self_contained(content: dict[str, Any], case: Case) -> dict[str, Any]:
-    """The content of a recipe with the runs of its simulator, so that it needs no other file."""
-    if case.simulator is None:
-        return content
-    return content | {"simulator": case.simulator.within()}
 
 
 def _take_blocks(settings: Settings) -> tuple[Block, ...]:

@@ -26,7 +26,6 @@ from datagen.blind_sets.reference_wheel import (
     MECHANISMS,
     ActiveMechanisms,
     Floats,
-    Mechanism,
     WheelState,
     solve_equilibrium,
 )
@@ -152,13 +151,16 @@ def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
     ]
     if plan.timed:
         for d, table in zip((runs, region, between), tables, strict=True):
-            table["time_s"] = _times(d)
+            # a run takes a quarter of an hour, its rows follow in ten seconds
+            row = np.arange(d.run.size) - np.searchsorted(d.run, d.run)
+            table["time_s"] = 900.0 * d.run + 10.0 * row
+    of_one_gear = MECHANISMS_OF_ONE_GEAR if plan.design == "two-gears" else ()
     of_a_vehicle = tuple((m, size) for m, size in active if m.name not in OF_THE_RIG)
     truth = {
         "plan": asdict(plan),
         "causes": [
-            {
-                "name": _stated_name(c, plan.design),
+            {  # with its gear where only one of two has it
+                "name": f"{c.name}@{GEARS[1]}" if c.name in of_one_gear else c.name,
                 "form": c.form,
                 "parameters": {c.size: {"value": v, "unit": c.unit}},
             }
@@ -217,12 +219,6 @@ def write_blind_set(plan: Plan, folder: Path, truth_folder: Path) -> None:
     (truth_folder / "truth.json").write_text(json.dumps(blind_set.truth, indent=1) + "\n")
 
 
-def _stated_name(mechanism: Mechanism, design: str) -> str:
-    """Name of a cause: that of the mechanism, with its gear where only one of two has it."""
-    of_one = design == "two-gears" and mechanism.name in MECHANISMS_OF_ONE_GEAR
-    return f"{mechanism.name}@{GEARS[1]}" if of_one else mechanism.name
-
-
 @dataclass(frozen=True)
 class _World:
     """A soil, the wheels on it, and the mechanisms that act."""
@@ -271,12 +267,6 @@ def _draw_scatter(
     return dict(zip(SCATTER, (phi.tolist(), k.tolist()), strict=True))
 
 
-def _times(schedule: RunSchedule) -> Floats:
-    """Times (s) of the rows: a run takes a quarter of an hour, its rows follow in ten seconds."""
-    first = np.searchsorted(schedule.run, schedule.run)
-    return np.asarray(900.0 * schedule.run + 10.0 * (np.arange(schedule.run.size) - first))
-
-
 def _measure(
     schedule: RunSchedule,
     true: list[Floats],
@@ -322,13 +312,8 @@ def _model(soil: dict[str, float], free: int, wheels: Wheels, declared: dict[str
 
 def csv_text(columns: Columns) -> str:
     """Columns (rows,) by name as the text of a CSV file; readings not taken are blank."""
-    names = list(columns)
-    lines = [",".join(names)]
+    lines = [",".join(columns)]
     for row in zip(*columns.values(), strict=True):
-        lines.append(",".join(_cell(value) for value in row))
+        cells = (v if isinstance(v, str) else "" if np.isnan(v) else f"{v:.8g}" for v in row)
+        lines.append(",".join(cells))
     return "\n".join(lines) + "\n"
-
-
-def _cell(value: str | float) -> str:
-    """A name or a number as text; a reading that was not taken is blank."""
-    return value if isinstance(value, str) else "" if np.isnan(value) else f"{value:.8g}"

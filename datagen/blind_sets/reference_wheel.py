@@ -153,14 +153,10 @@ def mechanism(
 ActiveMechanisms = tuple[tuple[Mechanism, float], ...]
 
 
-def _quadrature() -> tuple[Floats, Floats]:
-    """Gauss-Legendre nodes and weights on 0 to 1 in t, with x = t^2: dense where stress begins."""
-    x, w = np.polynomial.legendre.leggauss(NODES)
-    t = 0.5 * (x + 1.0)
-    return (t * t)[:, None], (w * t)[:, None]
-
-
-NODE, WEIGHT = _quadrature()
+#: Gauss-Legendre nodes and weights on 0 to 1 in t, with x = t^2: dense where stress begins.
+_X, _W = np.polynomial.legendre.leggauss(NODES)
+_T = 0.5 * (_X + 1.0)
+NODE, WEIGHT = (_T * _T)[:, None], (_W * _T)[:, None]
 #: Of the points of both halves of a contact, the way from its end to the largest stress.
 WAY = np.concatenate([NODE, NODE])
 
@@ -201,7 +197,16 @@ def ground_reaction(
     1 / (1 + s) when braking; tau has the sign of j, so that all forces are continuous in slip.
     Source: Wong and Reece 1967, parts 1 and 2.
     """
-    arc = _arc(depth_angle, rows, active)
+    arc = ContactArc(
+        entry=depth_angle,
+        exit=np.zeros_like(depth_angle),
+        peak=(rows.a0 + rows.a1 * rows.slip) * depth_angle,
+        sinkage=2.0 * rows.radius * np.sin(0.5 * depth_angle) ** 2,
+        radius=rows.radius,
+        shear_radius=rows.radius,
+        lever=rows.radius,
+    )
+    arc = _changed(arc, "arc", active, rows)
     front, rear = arc.entry - arc.peak, arc.peak - arc.exit
     swept_angle = np.concatenate([NODE * front, front + (1.0 - NODE) * rear])
     mapped = np.concatenate([NODE * front, NODE * front])
@@ -220,19 +225,6 @@ def ground_reaction(
     reaction = _changed(reaction, "force", active, rows)
     inside = (arc.exit < arc.peak) & (arc.peak < arc.entry)
     return replace(reaction, load=np.where(inside, reaction.load, np.nan))
-
-
-def _arc(depth_angle: Floats, rows: WheelState, active: ActiveMechanisms) -> ContactArc:
-    arc = ContactArc(
-        entry=depth_angle,
-        exit=np.zeros_like(depth_angle),
-        peak=(rows.a0 + rows.a1 * rows.slip) * depth_angle,
-        sinkage=2.0 * rows.radius * np.sin(0.5 * depth_angle) ** 2,
-        radius=rows.radius,
-        shear_radius=rows.radius,
-        lever=rows.radius,
-    )
-    return _changed(arc, "arc", active, rows)
 
 
 def _points(
