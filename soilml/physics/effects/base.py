@@ -83,32 +83,6 @@ class Effect:
 
     Raises `InputError` when a subclass is defined with a public method that begins with ``on_`` and
     is not one of `STAGES`.
-
-    Examples
-    --------
-    A sensor that reads 2 mm too deep:
-
-    >>> from dataclasses import replace
-    >>> from typing import Annotated
-    >>> from soilml.arrays import Real
-    >>> from soilml.parameters import Parameter
-    >>> from soilml.physics.effects import Effect, effect
-    >>> @effect(
-    ...     "zero",
-    ...     text="the zero of the sinkage sensor is off",
-    ...     source="linear sensor error",
-    ...     kind="sensor",
-    ...     reference={"offset": 0.002},
-    ...     signs={"sinkage": +1},
-    ...     isolate="the wheel on a plate",
-    ... )
-    ... class Zero(Effect):
-    ...     offset: Annotated[Real, Parameter("m", -0.05, 0.05)] = 0.0
-    ...
-    ...     def on_reading(self, force, load_case):
-    ...         return replace(force, sinkage=force.sinkage + self.offset)
-    >>> Zero(offset=0.002).overrides("on_reading"), Zero.overrides("on_force")
-    (True, False)
     """
 
     name: ClassVar[str]

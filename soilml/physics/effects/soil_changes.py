@@ -30,15 +30,6 @@ class SlipSinkage(SlipLoadScaling):
     References: Ding, Gao, Deng, Nagatani and Yoshida, J. Terramechanics 48(1), 2011, the
     slip-dependent exponent. An empirical law for small lugged wheels in dry sand; it does not
     describe how long digging takes.
-
-    Examples
-    --------
-    >>> from soilml import Model, Operating, SlipSinkage, Wheel, soil
-    >>> wheel, sand = Model(Wheel(radius=0.15, width=0.12)), soil("wong1989/dry_sand")
-    >>> at = Operating(slip=0.6, load=60.0)
-    >>> digging = (wheel + SlipSinkage(n1=0.4))(sand, at).sinkage / wheel(sand, at).sinkage
-    >>> f"{digging:.1f} times as deep"
-    '1.8 times as deep'
     """
 
     n1: Annotated[Real, Parameter("1", 0.0, 2.0, "growth of n per unit slip")] = 0.0
