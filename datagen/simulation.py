@@ -14,9 +14,8 @@ from pyarrow import compute
 from scipy.stats import qmc
 
 from datagen.gear_sensors import RUN_DRAWS, UNITS, VIBRATION_COLUMN
-from datagen.random_streams import normal_by_index
 from datagen.recipe import OPERATING_COLUMNS, SENSOR_COLUMNS, Block, Recipe
-from datagen.worlds import process_functions, smooth_error
+from datagen.worlds import normal_by_index, process_functions, smooth_error
 from soilml.arrays import Floats
 from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import InputError

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from soilml.arrays import Array, Floats
-from soilml.systems.wheel_legs.gaits import gait_metrics
 from soilml.systems.wheel_legs.resistive_force import (
     FEET,
     GROUNDS,
@@ -20,7 +19,7 @@ from soilml.systems.wheel_legs.resistive_force import (
     resistance_terms,
     wheel_leg,
 )
-from soilml.systems.wheel_legs.walk import walk
+from soilml.systems.wheel_legs.walk import gait_metrics, walk
 
 #: Stiffnesses over which the paper compares feet, alpha_z from 0.4 to 1.0 N/cm^3, and the ground
 #: for the comparison of numbers of legs, the middle of that range, which is not printed; N/m^3.
