@@ -11,9 +11,10 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.model_settings import take_prior
 from soilml.errors import InputError
+from soilml.io.declared_settings import take_declared
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
-from soilml.parameters import check, declared
+from soilml.parameters import check
 from soilml.physics.gears import Midstance
 from soilml.physics.soils import Soil
 from soilml.quantities import QUANTITIES
@@ -61,13 +62,11 @@ class StickSlip:
                 f"drop is [{drop.lower:g}, {drop.upper:g}]; needed are fractions of the friction "
                 "angle, between 0 and 1"
             )
-        own = [key for key in declared(SpringLeg) if key not in ("stiffness", "hub_mass")]
-        sizes = {key: settings.number(key) for key in own if key in settings}
+        given = {"stiffness": stiffness.lower, "hub_mass": SpringLeg.hub_mass}
+        leg = take_declared(SpringLeg, settings, **given)
         for end in (stiffness.lower, stiffness.upper):
-            check(SpringLeg(stiffness=end, **sizes), f"{settings.where}: ")
-        settings.permit(own)
-        settings.finish()
-        return cls(SpringLeg(stiffness=stiffness.lower, **sizes), stiffness, drop)
+            check(replace(leg, stiffness=end), f"{settings.where}: ")
+        return cls(leg, stiffness, drop)
 
     def simulate(
         self, case: Case, slip: Floats, load: Floats, lowest_load: float, u: Floats
