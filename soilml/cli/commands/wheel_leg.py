@@ -141,23 +141,16 @@ def _soil(args: argparse.Namespace, table: Table) -> int:
 
 def _heavy(args: argparse.Namespace) -> dict[str, Any]:
     """Arguments of `mobility` by --assume and --wheel."""
-    from soilml.cli.option_values import parse_numbers
-    from soilml.io.cell_text import read_number
+    from soilml.cli.option_values import named_numbers, parse_names, parse_numbers
     from soilml.physics.gears import Wheel
     from soilml.physics.operating_point import Operating
     from soilml.systems.wheel_legs.strides import UNKNOWN
 
     found: dict[str, Any] = {}
-    if args.assume is not None:
-        pairs = [part.partition("=")[::2] for part in args.assume.split(",")]
-        try:
-            found["known"] = {name.strip(): read_number(value.strip()) for name, value in pairs}
-        except ValueError:
-            found["known"] = {"": 0.0}
+    if assumed := parse_names(args.assume):
+        found["known"] = named_numbers(assumed, "--assume", "NAME=VALUE, such as n=0.7")
         if found["known"].keys() - UNKNOWN.keys():
-            raise InputError(
-                f"--assume is {args.assume!r}; needed are {', '.join(UNKNOWN)}, such as n=0.7"
-            )
+            raise InputError(f"--assume is {args.assume!r}; needed are {', '.join(UNKNOWN)}")
     if args.wheel is not None:
         sizes = parse_numbers("--wheel", args.wheel).tolist()
         if len(sizes) != 3 or min(sizes) <= 0.0:
