@@ -107,11 +107,12 @@ class Mechanism:
 
     acts: Function by stage, in the order in which they run. Each takes the value of its stage, the
         states that the value belongs to, and last the size. `driven`: from reported to true slip
-        and load. `soil`: the soil under this wheel. `arc`. `shape`: normal stress, the way from
-        either end of the contact (0) to its largest stress (1), and that largest stress; (points,
-        n) but the last, (n,). `pressure`: normal stress and its depth, (points, n). `shear`: from
-        the points of the contact. `force`: within the search for equilibrium. `reading`: from the
-        forces at equilibrium to the readings, for the true slip and load.
+        and load. `soil`: the soil under this wheel. `arc`: the rim in the soil. `shape`: normal
+        stress, the way from either end of the contact (0) to its largest stress (1), and that
+        largest stress; (points, n) but the last, (n,). `pressure`: normal stress and its depth,
+        (points, n). `shear`: the points of the contact. `force`: within the search for
+        equilibrium. `reading`: from the forces at equilibrium to the readings, for the true slip
+        and load.
     form: Names a law that differs from that of the analyst's effect of the same name.
     needs: The covariate, a field of `WheelState`, that must vary for it to have an effect.
     """
