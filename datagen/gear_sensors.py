@@ -62,8 +62,9 @@ class StickSlip:
                 f"drop is [{drop.lower:g}, {drop.upper:g}]; needed are fractions of the friction "
                 "angle, between 0 and 1"
             )
-        given = {"stiffness": stiffness.lower, "hub_mass": SpringLeg.hub_mass}
-        leg = take_declared(SpringLeg, settings, **given)
+        leg = take_declared(
+            SpringLeg, settings, stiffness=stiffness.lower, hub_mass=SpringLeg.hub_mass
+        )
         for end in (stiffness.lower, stiffness.upper):
             check(replace(leg, stiffness=end), f"{settings.where}: ")
         return cls(leg, stiffness, drop)
