@@ -75,7 +75,7 @@ class DrawnErrors:
             end = -size * share * np.arccos(1.0 - KAPPA * arc.sinkage / state.radius)
             return replace(arc, exit=np.minimum(end, FARTHEST_END * arc.peak))
 
-        return Mechanism(name="contact", size="share", reference=1.0, unit="1", arc=arc)
+        return Mechanism("contact", "share", 1.0, "1", {"arc": arc})
 
     def of_readings(self, true: dict[str, Floats], load: Floats) -> dict[str, Floats]:
         """What sensors read without noise, of the shape of load."""

@@ -1,13 +1,9 @@
-"""Catalogue of sensors that only one kind of gear has, by the table of the recipe that adds them.
-
-A new sensor is a class with the members of `StickSlip` and a line in `GEAR_SENSORS`.
-"""
+"""The vibration of wheel-legs, a sensor that only this gear has, by [stick_slip] of a recipe."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -15,15 +11,20 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.model_settings import take_prior
 from soilml.errors import InputError
+from soilml.io.declared_settings import take_declared
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
-from soilml.parameters import check, declared
+from soilml.parameters import check
 from soilml.physics.gears import Midstance
 from soilml.physics.soils import Soil
 from soilml.quantities import QUANTITIES
 from soilml.systems.wheel_legs.stances import GRAVITY, SpringLeg, vibration_amplitude
-from soilml.systems.wheel_legs.stride_relations import VIBRATION, soil_spring, spring_soil
+from soilml.systems.wheel_legs.stride_relations import SPRING, SPRING_OF_SOIL, VIBRATION, affine
 
+VIBRATION_COLUMN = "vibration_m_s2"
+#: Units of further columns that are no quantity of `soilml.quantities`.
+UNITS = {"stick-slip.stiffness": "N/m", "stick-slip.increment": "rad"}
+RUN_DRAWS = 2  # Random numbers that a run needs
 #: Relations of vibration to slip: the rotating spring, or the straight line fitted to tests.
 LAWS = ("spring", "line")
 MIN_SLOPE = 0.02  # s^2/m; with a smaller slope of the line, vibration (its inverse) diverges
@@ -31,25 +32,15 @@ MIN_SLOPE = 0.02  # s^2/m; with a smaller slope of the line, vibration (its inve
 
 @dataclass(frozen=True)
 class StickSlip:
-    """The recipe's [stick_slip]: a law, and for the spring a leg and its unknown parameters.
+    """The recipe's [stick_slip]: a leg, and for the spring its unknown parameters.
 
     `stiffness` is k_S (N/m), `drop` the fraction of the friction angle that soil loses once it
     slides; both have one value in each run. None with the law `line`, where both follow the soil.
     """
 
-    sensor: ClassVar[str] = "vibration_m_s2"  # column of its reading
-    #: Units of further columns that are no quantity of `soilml.quantities`.
-    units: ClassVar[Mapping[str, str]] = {
-        "stick-slip.stiffness": "N/m",
-        "stick-slip.increment": "rad",
-    }
-    run_draws: ClassVar[int] = 2  # random numbers that a run needs
-    lowest_slip: ClassVar[float] = 0.0  # below it there is no reading
-
-    law: str
     leg: SpringLeg
-    stiffness: Prior | None
-    drop: Prior | None
+    stiffness: Prior | None = None
+    drop: Prior | None = None
 
     @classmethod
     def take(cls, settings: Settings, case: Case) -> StickSlip:
@@ -59,39 +50,53 @@ class StickSlip:
                 "the table is for wheel-legs only; needed is [gear] type = 'midstance', not "
                 f"{case.model.gear.name!r}"
             )
-        return _take_stick_slip(settings)
+        law = settings.text("law", LAWS[0])
+        if law not in LAWS:
+            settings.fail(f"law is {law!r}; needed is one of: {', '.join(LAWS)}")
+        if law == "line":
+            settings.finish()
+            return cls(SpringLeg(stiffness=1000.0))
+        stiffness, drop = take_prior(settings, "stiffness"), take_prior(settings, "drop")
+        if not 0.0 <= drop.lower < drop.upper <= 1.0:
+            settings.fail(
+                f"drop is [{drop.lower:g}, {drop.upper:g}]; needed are fractions of the friction "
+                "angle, between 0 and 1"
+            )
+        leg = take_declared(
+            SpringLeg, settings, stiffness=stiffness.lower, hub_mass=SpringLeg.hub_mass
+        )
+        for end in (stiffness.lower, stiffness.upper):
+            check(replace(leg, stiffness=end), f"{settings.where}: ")
+        return cls(leg, stiffness, drop)
 
     def simulate(
         self, case: Case, slip: Floats, load: Floats, lowest_load: float, u: Floats
     ) -> tuple[Floats, dict[str, Floats]]:
         """Vibration (m/s^2) and the columns of the parameters that it depends on, (n,).
 
-        `case` has the soil of each row. `u` (n, run_draws) are uniform between 0 and 1, the same in
+        `case` has the soil of each row. `u` (n, RUN_DRAWS) are uniform between 0 and 1, the same in
         all rows of a run. No load of the recipe is below `lowest_load` (N): what is derived from it
         does not depend on the pieces in which rows are simulated.
         """
-        width = case.parameters()["gear.width"][1]
-        leg = self.leg_parameters(case.soil, width, u)
-        vibration = self.vibration(case.soil, slip, load, leg, lowest_load)
-        stiffness = np.broadcast_to(normal_stiffness(case.soil, width), slip.shape)
-        columns = {QUANTITIES["normal_stiffness"].column: stiffness}
+        firmness = normal_stiffness(case.soil, case.parameters()["gear.width"][1])
+        leg = self._leg(case.soil, firmness, u)
+        vibration = self._vibration(case.soil, slip, load, leg, lowest_load)
+        columns = {QUANTITIES["normal_stiffness"].column: np.broadcast_to(firmness, slip.shape)}
         return vibration, columns | {f"stick-slip.{name}": v for name, v in leg.items()}
 
-    def leg_parameters(self, soil: Soil, width: Any, u: Floats) -> dict[str, Floats]:
+    def _leg(self, soil: Soil, firmness: Floats, u: Floats) -> dict[str, Floats]:
         """k_S (N/m) and the drop of friction (rad), (n,), for fractions `u` (n, 2) of their ranges.
 
         Without ranges they follow Comin and Saaj 2017, eq. 28.
         """
         if self.stiffness is None or self.drop is None:
-            stiffness = normal_stiffness(soil, width)
-            found = np.broadcast_arrays(
-                *soil_spring(np.asarray(soil.friction_angle), stiffness), u[:, 0]
-            )
+            drop, stiffness = affine(SPRING_OF_SOIL, np.asarray(soil.friction_angle), firmness)
+            found = np.broadcast_arrays(drop, stiffness, u[:, 0])
             return {"stiffness": found[1], "increment": found[0]}
         increment = self.drop.at(u[:, 1]) * np.asarray(soil.friction_angle)
         return {"stiffness": self.stiffness.at(u[:, 0]), "increment": increment}
 
-    def vibration(
+    def _vibration(
         self, soil: Soil, slip: Floats, load: Floats, leg: dict[str, Floats], lowest_load: float
     ) -> Floats:
         r"""Largest amplitude of the hub's acceleration (m/s^2) in a stride, (n,), without noise.
@@ -100,8 +105,8 @@ class StickSlip:
         Saaj 2017, eq. 24, with the linear parameters of their table V: \Delta a = (i - a) / b.
         Raises `InputError` for a soil on which that line has no slope.
         """
-        if self.law == "line":
-            a, b = VIBRATION.line(*spring_soil(leg["increment"], leg["stiffness"]))
+        if self.stiffness is None:
+            a, b = VIBRATION.line(*affine(SPRING, leg["increment"], leg["stiffness"]))
             if b.min() < MIN_SLOPE:
                 drop = np.rad2deg(leg["increment"][int(np.argmin(b))])
                 raise InputError(
@@ -111,10 +116,9 @@ class StickSlip:
             return np.asarray(np.maximum((slip - a) / b, 0.0))
         # an additional row, the stiffest leg with the lightest hub, sets the same time step in
         # all pieces
-        stiffest = self.stiffness.upper if self.stiffness else 0.0
         spring = replace(
             self.leg,
-            stiffness=np.append(leg["stiffness"], stiffest),
+            stiffness=np.append(leg["stiffness"], self.stiffness.upper),
             hub_mass=np.append(load, lowest_load) / GRAVITY,
         )
         angle = np.append(np.broadcast_to(soil.friction_angle, slip.shape), 0.5)
@@ -130,30 +134,3 @@ def normal_stiffness(soil: Soil, width: Any) -> Floats:
     References: Comin and Saaj 2017, who write sigma_0 + alpha_z 1 cm for a linear soil.
     """
     return np.asarray((soil.kc / width + soil.kphi) * 0.01**soil.n)
-
-
-def _take_stick_slip(settings: Settings) -> StickSlip:
-    """Read the table; raises `InputError` naming the key."""
-    law = settings.text("law", LAWS[0])
-    if law not in LAWS:
-        settings.fail(f"law is {law!r}; needed is one of: {', '.join(LAWS)}")
-    if law == "line":
-        settings.finish()
-        return StickSlip(law, SpringLeg(stiffness=1000.0), None, None)
-    stiffness, drop = take_prior(settings, "stiffness"), take_prior(settings, "drop")
-    if not 0.0 <= drop.lower < drop.upper <= 1.0:
-        settings.fail(
-            f"drop is [{drop.lower:g}, {drop.upper:g}]; needed are fractions of the friction "
-            "angle, between 0 and 1"
-        )
-    own = [key for key in declared(SpringLeg) if key not in ("stiffness", "hub_mass")]
-    sizes = {key: settings.number(key) for key in own if key in settings}
-    for end in (stiffness.lower, stiffness.upper):
-        check(SpringLeg(stiffness=end, **sizes), f"{settings.where}: ")
-    settings.permit(own)
-    settings.finish()
-    return StickSlip(law, SpringLeg(stiffness=stiffness.lower, **sizes), stiffness, drop)
-
-
-#: Table of a recipe -> the sensor that it adds. Random streams follow this order: append only.
-GEAR_SENSORS: dict[str, type[StickSlip]] = {"stick_slip": StickSlip}

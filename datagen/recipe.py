@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from datagen.gear_sensors import GEAR_SENSORS, StickSlip
+from datagen.gear_sensors import VIBRATION_COLUMN, StickSlip
 from datagen.worlds import Worlds, take_worlds
 from soilml.config.case import Case, take_case
 from soilml.config.measurement_noise import Noise, take_noise
@@ -37,7 +37,7 @@ SENSOR_COLUMNS = (
     "torque_Nm",
     "drawbar_pull_N",
     "sinkage_m",
-    *(kind.sensor for kind in GEAR_SENSORS.values()),
+    VIBRATION_COLUMN,
 )
 
 
@@ -73,7 +73,7 @@ class Recipe:
     slip: Prior
     load: Prior
     covariates: dict[str, Prior]
-    gear_sensors: dict[str, StickSlip]
+    stick_slip: StickSlip | None
     bias: dict[str, Noise]
     blocks: tuple[Block, ...]
     rows: int
@@ -199,17 +199,14 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
             if field not in covariates:
                 operating.fail(f"{COVARIATES[field]} is missing; the effect {effect.name} needs it")
     operating.finish()
-    gear_sensors: dict[str, StickSlip] = {}
-    for table, kind in GEAR_SENSORS.items():
-        if table in settings:
-            gear_sensors[table] = kind.take(settings.table(table), case)
-            if slip.lower < kind.lowest_slip:
-                needed = f"[{table}] needs slips of {kind.lowest_slip:g} or more"
-                operating.fail(f"slip begins at {slip.lower:g}; {needed}")
-    worlds = None
+    stick_slip = worlds = None
+    if "stick_slip" in settings:
+        stick_slip = StickSlip.take(settings.table("stick_slip"), case)
+        if slip.lower < 0.0:
+            operating.fail(f"slip begins at {slip.lower:g}; [stick_slip] needs slips of 0 or more")
     if "worlds" in settings:
-        if gear_sensors:
-            settings.fail(f"[worlds] and [{next(iter(gear_sensors))}] in one recipe: needed is one")
+        if stick_slip is not None:
+            settings.fail("[worlds] and [stick_slip] in one recipe: needed is one")
         driven = (slip.lower, slip.upper), (load.lower, load.upper)
         given = frozenset(covariates)
         worlds = take_worlds(settings.table("worlds"), case, driven, effects, given)
@@ -219,20 +216,24 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
     bias_settings.finish()
     for key in case.noise.keys() - set(SENSOR_COLUMNS):
         settings.fail(f"[noise] {key}: a sensor of {COLUMNS[key].text} is not simulated")
-    for table, kind in GEAR_SENSORS.items():
-        if kind.sensor in (*case.noise, *bias) and table not in gear_sensors:
-            settings.fail(f"[noise] {kind.sensor}: the table [{table}] is missing, which adds it")
+    if VIBRATION_COLUMN in (*case.noise, *bias) and stick_slip is None:
+        settings.fail(
+            f"[noise] {VIBRATION_COLUMN}: the table [stick_slip] is missing, which adds it"
+        )
+    content = settings.content
+    if case.simulator is not None:  # with its runs, so that it needs no other file
+        content = content | {"simulator": case.simulator.within()}
     return Recipe(
         case=case,
         slip=slip,
         load=load,
         covariates=covariates,
-        gear_sensors=gear_sensors,
+        stick_slip=stick_slip,
         bias=bias,
         blocks=_take_blocks(settings),
         rows=settings.count("rows"),
         seed=int(settings.take("seed", int, "a whole number, 0 or more")),
-        content=_self_contained(settings.content, case),
+        content=content,
         worlds=worlds,
     )
 
@@ -248,13 +249,6 @@ def _check_simulated(operating: Settings, gear: Gear, slip: Prior, load: Prior) 
                 f"{column(name)} is [{own.lower:g}, {own.upper:g}]; the runs of the simulator have "
                 f"{gear.lower[i]:g} to {gear.upper[i]:g}: narrow it, or simulate more"
             )
-
-
-def _self_contained(content: dict[str, Any], case: Case) -> dict[str, Any]:
-    """The content of a recipe with the runs of its simulator, so that it needs no other file."""
-    if case.simulator is None:
-        return content
-    return content | {"simulator": case.simulator.within()}
 
 
 def _take_blocks(settings: Settings) -> tuple[Block, ...]:

@@ -13,25 +13,21 @@ from numpy.typing import NDArray
 from pyarrow import compute
 from scipy.stats import qmc
 
-from datagen.gear_sensors import GEAR_SENSORS
-from datagen.random_streams import normal_by_index
+from datagen.gear_sensors import RUN_DRAWS, UNITS, VIBRATION_COLUMN
 from datagen.recipe import OPERATING_COLUMNS, SENSOR_COLUMNS, Block, Recipe
-from datagen.worlds import process_functions, smooth_error
+from datagen.worlds import normal_by_index, process_functions, smooth_error
 from soilml.arrays import Floats
-from soilml.config.case import Case
 from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
 from soilml.numerics.smooth_process import SmoothFunctions
-from soilml.physics.contact import Force
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.quantities import CHANNELS, COLUMNS, QUANTITIES, column
 from soilml.row_status import Status
 
 MOST_RUNS = 2**30  # Points of a Sobol sequence of scipy: runs that a block can have
 PIECE = 16384  # Rows of a piece: one row group of a file
-#: Number of the first random stream of gear sensors; lower ones are those of `sample_rows`.
-FIRST_STREAM = 4
+SENSOR_STREAM = 4  # Random stream of the vibration; lower ones are those of `sample_rows`
 REASONS = np.asarray([status.reason for status in Status])  # Text of the column `status` by status
 
 
@@ -119,10 +115,17 @@ def _simulate(recipe: Recipe, piece: Piece) -> tuple[np.ndarray, dict[str, np.nd
         seed = recipe.seed, block
         force = recipe.worlds.forces(case, at, seed, rows.run)
         errors.append(recipe.worlds.errors(recipe.driven, at, seed, rows.run))
-    truth = true_values(rows.slip, rows.load, force)
+    truth = {"slip": rows.slip, "load_N": rows.load}
+    truth |= {column(name): getattr(force, name) for name in CHANNELS}
     for name, error in (pair for own in errors for pair in own.items()):
         truth[name] = truth[name] + error
-    sensor_columns = _add_gear_sensors(recipe, case, block, rows, truth)
+    sensor_columns: dict[str, Floats] = {}
+    if recipe.stick_slip is not None:
+        used = len(recipe.case.prior) + len(OPERATING_COLUMNS) + len(recipe.covariates)
+        u = run_fractions(recipe, block, rows.run, RUN_DRAWS, SENSOR_STREAM, used)
+        truth[VIBRATION_COLUMN], sensor_columns = recipe.stick_slip.simulate(
+            case, rows.slip, rows.load, recipe.load.lower, u
+        )
     row = np.arange(piece.first, piece.last)
     readings = noisy_readings(recipe, block, row, rows.run, truth)
     names = {path: QUANTITIES[path].column if path in QUANTITIES else path for path in rows.soil}
@@ -159,29 +162,11 @@ def model_error(
     return errors
 
 
-def _add_gear_sensors(
-    recipe: Recipe, case: Case, block: int, rows: SampledRows, truth: dict[str, np.ndarray]
-) -> dict[str, np.ndarray]:
-    """Add the readings of the recipe's gear sensors to `truth`; returns their further columns."""
-    columns: dict[str, np.ndarray] = {}
-    used = len(recipe.case.prior) + len(OPERATING_COLUMNS) + len(recipe.covariates)
-    for table, sensor in recipe.gear_sensors.items():
-        stream = FIRST_STREAM + list(GEAR_SENSORS).index(table)
-        u = run_fractions(recipe, block, rows.run, sensor.run_draws, stream, used)
-        used += sensor.run_draws
-        reading, own = sensor.simulate(case, rows.slip, rows.load, recipe.load.lower, u)
-        truth[sensor.sensor] = reading
-        columns |= own
-    return columns
-
-
 def data_schema(recipe: Recipe) -> pa.Schema:
     """Columns of the data with their units; recipe, seed and versions as metadata."""
     probe = simulate_rows(recipe, 0, 0, 1)
     own = {name: parameter.unit for name, (parameter, _) in recipe.case.parameters().items()}
-    for sensor in recipe.gear_sensors.values():
-        own |= sensor.units
-    units = {name: COLUMNS[name].unit if name in COLUMNS else own[name] for name in probe}
+    units = {n: COLUMNS[n].unit if n in COLUMNS else (own | UNITS)[n] for n in probe}
     fields = [
         pa.field(
             name,
@@ -278,28 +263,11 @@ def run_fractions(
 
 def _sobol(dimensions: int, seed: tuple[int, ...], skip: int, count: int) -> Floats:
     sequence = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))
-    _skip(sequence, int(skip))
+    if skip:
+        sequence.fast_forward(int(skip))
     with warnings.catch_warnings():  # pieces of a sequence need not be powers of two
         warnings.simplefilter("ignore", UserWarning)
         return np.asarray(sequence.random(int(count)))
-
-
-def _skip(sequence: qmc.Sobol, count: int) -> None:
-    """Do what `sequence.fast_forward(count)` does, in constant time instead of linear.
-
-    Point n of the sequence is the first one with the direction numbers of the bits of the Gray code
-    of n added without carry (Antonov and Saleev 1979, eq. 4).
-    """
-    if not count:
-        return
-    if not (hasattr(sequence, "_sv") and hasattr(sequence, "_quasi")):
-        sequence.fast_forward(count)
-        return
-    last = count - 1
-    for bit in range(last.bit_length()):
-        if (last ^ last >> 1) >> bit & 1:
-            sequence._quasi ^= sequence._sv[:, bit]
-    sequence.num_generated += count
 
 
 def noisy_readings(
@@ -332,14 +300,3 @@ def noisy_readings(
             reading = np.maximum(reading, 1e-3 * true)
         readings[name] = reading
     return readings
-
-
-def true_values(slip: Floats, load: Floats, force: Force) -> dict[str, Floats]:
-    """The true values of the measured columns, (n,), SI."""
-    return {
-        "slip": slip,
-        "load_N": load,
-        "torque_Nm": force.torque,
-        "drawbar_pull_N": force.drawbar_pull,
-        "sinkage_m": force.sinkage,
-    }

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.random_streams import normal_by_index, uniform_by_index
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Discrepancy, range_with_zero
@@ -21,9 +21,9 @@ from soilml.errors import InputError
 from soilml.fitting.candidate_effects import candidate_effects, with_effect
 from soilml.io.toml_settings import Settings
 from soilml.numerics.smooth_process import SmoothFunctions, process_columns, slip_load_points
-from soilml.parameters import declared
+from soilml.parameters import declared, mapped
 from soilml.physics.contact import Force
-from soilml.physics.effects import Effect, EffectCard
+from soilml.physics.effects import Effect
 from soilml.physics.operating_point import COVARIATES, FROM_ORDER, Operating
 from soilml.quantities import CHANNELS, column
 
@@ -66,13 +66,13 @@ class Worlds:
         parts: dict[str, Any] = {}
         for i in np.unique(number):
             own = np.flatnonzero(number == i)
-            of_rows = _rows_of(case, own)
+            of_rows = mapped(case, partial(_cut, own))
             if i < len(self.effects):
                 effect = list(self.effects.values())[i]
                 size = _sizes(effect, normal[own], uniform[own])
                 changed = with_effect(of_rows, effect)
                 of_rows = changed.with_values({f"{effect.name}.{effect.about.size}": size})
-            force = of_rows.model(of_rows.soil, _points_of(at, own))
+            force = of_rows.model(of_rows.soil, mapped(at, partial(_cut, own)))
             for field in fields(Force):
                 value = np.broadcast_to(np.asarray(getattr(force, field.name)), own.shape)
                 whole = parts.setdefault(field.name, np.empty(len(run), value.dtype))
@@ -152,10 +152,12 @@ def take_worlds(
             settings.fail(f"{key} is {share:g}; needed is a share of the runs from 0 to 1")
     suited = candidate_effects(case, known)
     own = {effect.name for effect in case.model.effects}
-    possible = {
+    possible = {  # effects that act on rows without an order, with these covariates
         name: effect
         for name, effect in suited.items()
-        if name not in own and _can_act(effect.about, given)
+        if name not in own
+        and set(effect.about.needs) <= given
+        and not {*effect.about.needs, *effect.about.uses} & FROM_ORDER.keys()
     }
     names = settings.take("effects", list, "a list of names of effects", list(possible))
     for name in names:
@@ -173,11 +175,6 @@ def take_worlds(
     return Worlds(shares[0], {name: possible[name] for name in names}, shares[1], amplitudes)
 
 
-def _can_act(about: EffectCard, given: frozenset[str]) -> bool:
-    """Whether an effect acts on rows without an order, with these covariates."""
-    return set(about.needs) <= given and not {*about.needs, *about.uses} & FROM_ORDER.keys()
-
-
 def _sizes(effect: type[Effect], normal: Floats, uniform: Floats) -> Floats:
     """Sizes (n,) of an effect, in the unit of its size and inside its range."""
     about, parameter = effect.about, declared(effect)[effect.about.size]
@@ -188,20 +185,9 @@ def _sizes(effect: type[Effect], normal: Floats, uniform: Floats) -> Floats:
     return np.asarray(np.clip(size, parameter.lower, parameter.upper))
 
 
-def _rows_of(case: Case, own: NDArray[np.intp]) -> Case:
-    """The case with those of its parameters that differ between rows cut to some of them."""
-    cut = {
-        path: value[own]
-        for path, (_, value) in case.parameters().items()
-        if isinstance(value, np.ndarray) and value.ndim
-    }
-    return case.with_values(cut)
-
-
-def _points_of(at: Operating, own: NDArray[np.intp]) -> Operating:
-    """Some of the rows of operating points."""
-    given = {f.name: getattr(at, f.name) for f in fields(at)}
-    return replace(at, **{k: v[own] for k, v in given.items() if isinstance(v, np.ndarray)})
+def _cut(own: NDArray[np.intp], value: Any) -> Any:
+    """Some of the rows of a value that differs between them."""
+    return value[own] if np.ndim(value) else value
 
 
 def _channel_ranges(
@@ -219,3 +205,20 @@ def _channel_ranges(
             "model's error is not known; give a soil that does"
         )
     return ranges
+
+
+def uniform_by_index(seed: tuple[int, ...], index: NDArray[np.int64]) -> Floats:
+    """Uniform numbers (n,) in 0 to 1 by ascending index (n,), from a counter-based generator."""
+    first, last = int(index[0]), int(index[-1]) + 1
+    start = first - first % 4  # Philox generates four words at a time
+    generator = np.random.Philox(np.random.SeedSequence(seed))
+    generator.advance(start // 4)
+    uniform = np.random.Generator(generator).random(last - start)[first - start :]
+    return np.asarray(uniform[index - first])
+
+
+def normal_by_index(seed: tuple[int, ...], index: NDArray[np.int64]) -> Floats:
+    """Standard normal numbers (n,) by ascending index (n,)."""
+    from scipy.special import ndtri
+
+    return np.asarray(ndtri(np.clip(uniform_by_index(seed, index), 1e-16, 1.0 - 1e-16)))

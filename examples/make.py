@@ -7,17 +7,19 @@ python examples/make.py track      one
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from soilml import SlipSinkage, Table, read_case, simulate, soil
+from soilml import Case, Operating, SlipSinkage, Table, read_case, simulate, soil
 from soilml.io.text_tables import csv_text
 from soilml.systems.rim_stress import SensingWheel, SteadyRun, balanced_arc, simulate_readings
-from soilml.systems.rim_stress.simulation import SLOPES, SimulatedRover, climb_tables
-from soilml.systems.tracked_robot.track_log import simulate_log
+from soilml.systems.rim_stress.climbs import WHEELS, Climb, WheelRun
+from soilml.systems.rim_stress.simulation import SLOPES, SimulatedRover
+from soilml.systems.tracked_robot.track_log import LASERS, LOG
 from soilml.systems.wheel_legs.stride_relations import (
     S_I,
     S_Z,
@@ -99,6 +101,40 @@ def sensor_wheel(folder: Path) -> dict[str, str]:
     }
 
 
+def climb_tables(
+    climbs: Sequence[Climb],
+    front: Sequence[WheelRun] = (),
+    rear: Sequence[WheelRun] = (),
+    *,
+    rim_speed: float,
+) -> tuple[dict[str, list[Any]], dict[str, list[Any]]]:
+    """Tables (runs, stresses) of columns as they are read, with speeds by that of the rim (m/s).
+
+    `front` and `rear` are stresses at artificial slip, which become runs without a slope.
+    """
+    each = [
+        (climb.name, wheel, climb.slope, run)
+        for climb in climbs
+        for wheel, run in zip(WHEELS, climb.wheels, strict=True)
+    ]
+    for wheel, artificial in zip(WHEELS, (front, rear), strict=True):
+        each += [(f"flat_{wheel}_{i}", wheel, np.nan, r) for i, r in enumerate(artificial, 1)]
+    runs: dict[str, list[Any]] = {
+        "run": [name for name, _, _, _ in each],
+        "wheel": [wheel for _, wheel, _, _ in each],
+        "slope_rad": [slope for _, _, slope, _ in each],
+        "speed_m_s": [rim_speed * (1.0 - run.slip) for _, _, _, run in each],
+        "rim_speed_m_s": [rim_speed for _ in each],
+    }
+    samples = [
+        (name, wheel, float(angle), float(normal))
+        for name, wheel, _, run in each
+        for angle, normal in zip(run.profile.angle, run.profile.normal, strict=True)
+    ]
+    names = ("run", "wheel", "angle_rad", "normal_Pa")
+    return runs, {n: list(own) for n, own in zip(names, zip(*samples, strict=True), strict=True)}
+
+
 def climb(folder: Path) -> dict[str, str]:
     """Climbs of 0 and 4 degrees, and artificial slip on the flat."""
     true, rng = SimulatedRover(), np.random.default_rng(4)
@@ -125,6 +161,41 @@ def wheel_leg(folder: Path) -> dict[str, str]:
             cells = values if key == "run" else np.round(values, 4).tolist()
             columns.setdefault(key, []).extend(cells)
     return {"strides.csv": csv_text(columns)}
+
+
+def simulate_log(
+    case: Case, slips: Any, load: float, spacing: float, rng: np.random.Generator
+) -> dict[str, list[Any]]:
+    """Columns of a log of pulls at slips, 20 Hz: the payload tightens, then the robot pulls on.
+
+    The tension has oscillations of 5 %, the lasers a millimetre of noise, and ruts of 4 mm.
+    """
+    at = Operating(slip=np.asarray(slips, float), load=load)
+    force, track = case.model(case.soil, at), case.model.gear
+    belt = track.contact_geometry(np.asarray(force.sinkage), case.soil, at)
+    columns: dict[str, list[Any]] = {name: [] for name in (*LOG, *LASERS)}
+    time = np.arange(0.0, 40.0, 0.05)
+    tight = np.clip((time - 4.0) / 4.0, 0.0, 1.0)
+    trims, rears = np.asarray(belt.trim), np.asarray(belt.rear)
+    for k, (slip, pull) in enumerate(zip(slips, np.asarray(force.drawbar_pull), strict=True)):
+        turned = 0.05 * np.maximum(time - 4.0, 0.0)
+        noise = rng.standard_normal((3, time.size))
+        swing = np.convolve(rng.standard_normal(time.size + 9), np.ones(10) / 10**0.5, "valid")
+        ruts = 0.002 * np.sign(np.sin(2.0 * np.pi * turned / 0.05))
+        rear = 0.2 + float(rears[k]) - spacing * np.sin(float(trims[k])) + ruts
+        values = (
+            [f"pull_{k + 1}"] * time.size,
+            time,
+            turned,
+            (1.0 - float(slip)) * turned + 2e-4 * noise[0],
+            2.0 * float(pull) * tight * (1.0 + 0.05 * swing) + 2.0 * noise[1],
+            0.2 + 1e-3 * noise[2],
+            rear + 1e-3 * noise[0],
+            np.full(time.size, float(trims[k])),
+        )
+        for name, value in zip(columns, values, strict=True):
+            columns[name] += list(value)
+    return columns
 
 
 def track(folder: Path) -> dict[str, str]:

@@ -13,7 +13,8 @@ a plan, and its truth.
 """
 
 from datagen.blind_sets.blind_set import BlindSet, csv_text, draw_blind_set, write_blind_set
-from datagen.blind_sets.plans import MECHANISMS, Plan, benchmark_plans
+from datagen.blind_sets.plans import Plan, benchmark_plans
+from datagen.blind_sets.reference_wheel import MECHANISMS
 
 __all__ = [
     "MECHANISMS",

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.blind_sets.catalogued import RIG_MECHANISMS, SENSOR_MECHANISMS
 from datagen.blind_sets.plans import Plan, active_mechanisms
 from datagen.blind_sets.reading_errors import (
     AUTOCORRELATION,
@@ -24,9 +23,9 @@ from datagen.blind_sets.reading_errors import (
     simulate_readings,
 )
 from datagen.blind_sets.reference_wheel import (
+    MECHANISMS,
     ActiveMechanisms,
     Floats,
-    Mechanism,
     WheelState,
     solve_equilibrium,
 )
@@ -59,6 +58,8 @@ SCATTER = ("friction_angle_offset_rad", "modulus_factor")  # Its members in the 
 #: belong to its rim.
 GEARS = ("wheel_a", "wheel_b")
 MECHANISMS_OF_ONE_GEAR = ("grousers",)
+#: Mechanisms of rig and sensors, which do not act on a vehicle.
+OF_THE_RIG = {"slope", "load-transfer", "bearing-friction", *MECHANISMS["S"]}
 #: Smallest sinkage with the discrepancy, over that without: a wheel on soil sinks.
 LEAST_SINKAGE = 0.3
 ATTEMPTS = 50  # Soils tried before a plan is given up
@@ -100,13 +101,6 @@ def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
     without the mechanism: soils without one are drawn again.
 
     Raises `RuntimeError` where no soil of the family carries all rows.
-
-    Examples
-    --------
-    >>> plan = Plan("A", "grousers", 1.0, 0.01, 4, "dry-sand", 3, seed=1)
-    >>> blind_set = draw_blind_set(plan)
-    >>> [cause["name"] for cause in blind_set.truth["causes"]], blind_set.columns["slip"].shape
-    (['grousers'], (64,))
     """
     active: ActiveMechanisms = tuple(
         (c, plan.size * c.reference) for c in active_mechanisms(plan.tier, plan.cause)
@@ -157,12 +151,16 @@ def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
     ]
     if plan.timed:
         for d, table in zip((runs, region, between), tables, strict=True):
-            table["time_s"] = _times(d)
+            # a run takes a quarter of an hour, its rows follow in ten seconds
+            row = np.arange(d.run.size) - np.searchsorted(d.run, d.run)
+            table["time_s"] = 900.0 * d.run + 10.0 * row
+    of_one_gear = MECHANISMS_OF_ONE_GEAR if plan.design == "two-gears" else ()
+    of_a_vehicle = tuple((m, size) for m, size in active if m.name not in OF_THE_RIG)
     truth = {
         "plan": asdict(plan),
         "causes": [
-            {
-                "name": _stated_name(c, plan.design),
+            {  # with its gear where only one of two has it
+                "name": f"{c.name}@{GEARS[1]}" if c.name in of_one_gear else c.name,
                 "form": c.form,
                 "parameters": {c.size: {"value": v, "unit": c.unit}},
             }
@@ -197,7 +195,7 @@ def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
             "load_N": beyond.load.tolist(),
             "covariates": {name: float(v[0]) for name, v in beyond.covariates.items()},
             "true": _by_channel(
-                _sum(replace(world, active=_of_a_vehicle(active)).channels(beyond), extra[3])
+                _sum(replace(world, active=of_a_vehicle).channels(beyond), extra[3])
             ),
         },
     }
@@ -219,12 +217,6 @@ def write_blind_set(plan: Plan, folder: Path, truth_folder: Path) -> None:
     (folder / "region.csv").write_text(csv_text(blind_set.region))
     (folder / "model.toml").write_text(blind_set.model)
     (truth_folder / "truth.json").write_text(json.dumps(blind_set.truth, indent=1) + "\n")
-
-
-def _stated_name(mechanism: Mechanism, design: str) -> str:
-    """Name of a cause: that of the mechanism, with its gear where only one of two has it."""
-    of_one = design == "two-gears" and mechanism.name in MECHANISMS_OF_ONE_GEAR
-    return f"{mechanism.name}@{GEARS[1]}" if of_one else mechanism.name
 
 
 @dataclass(frozen=True)
@@ -275,18 +267,6 @@ def _draw_scatter(
     return dict(zip(SCATTER, (phi.tolist(), k.tolist()), strict=True))
 
 
-def _of_a_vehicle(active: ActiveMechanisms) -> ActiveMechanisms:
-    """The mechanisms of soil and gear, which act on a vehicle too."""
-    of_rig = {m.key for m in (*RIG_MECHANISMS, *SENSOR_MECHANISMS)}
-    return tuple((m, size) for m, size in active if m.key not in of_rig)
-
-
-def _times(schedule: RunSchedule) -> Floats:
-    """Times (s) of the rows: a run takes a quarter of an hour, its rows follow in ten seconds."""
-    first = np.searchsorted(schedule.run, schedule.run)
-    return np.asarray(900.0 * schedule.run + 10.0 * (np.arange(schedule.run.size) - first))
-
-
 def _measure(
     schedule: RunSchedule,
     true: list[Floats],
@@ -332,13 +312,8 @@ def _model(soil: dict[str, float], free: int, wheels: Wheels, declared: dict[str
 
 def csv_text(columns: Columns) -> str:
     """Columns (rows,) by name as the text of a CSV file; readings not taken are blank."""
-    names = list(columns)
-    lines = [",".join(names)]
+    lines = [",".join(columns)]
     for row in zip(*columns.values(), strict=True):
-        lines.append(",".join(_cell(value) for value in row))
+        cells = (v if isinstance(v, str) else "" if np.isnan(v) else f"{v:.8g}" for v in row)
+        lines.append(",".join(cells))
     return "\n".join(lines) + "\n"
-
-
-def _cell(value: str | float) -> str:
-    """A name or a number as text; a reading that was not taken is blank."""
-    return value if isinstance(value, str) else "" if np.isnan(value) else f"{value:.8g}"

@@ -9,25 +9,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from datagen.blind_sets.catalogued import RIG_MECHANISMS, SENSOR_MECHANISMS, TEXTBOOK_FORMS
-from datagen.blind_sets.law_families import LAW_MECHANISMS, TREND_MECHANISMS
-from datagen.blind_sets.reference_wheel import Mechanism
+# imported for the mechanisms that they declare
+from datagen.blind_sets import catalogued, law_families, uncatalogued  # noqa: F401
+from datagen.blind_sets.reference_wheel import MECHANISMS, Mechanism
 from datagen.blind_sets.soil_families import FAMILIES
-from datagen.blind_sets.uncatalogued import ALTERNATIVE_FORMS, UNCATALOGUED_MECHANISMS
-
-#: Tier -> mechanism by its key. A: textbook form, soil, wheel and rig; B: alternative form; C: in
-#: no catalogue of the analyst; S: sensors; L: another law of the soil; T: a soil that changes.
-MECHANISMS: dict[str, dict[str, Mechanism]] = {
-    tier: {mechanism.key: mechanism for mechanism in mechanisms}
-    for tier, mechanisms in (
-        ("A", (*TEXTBOOK_FORMS, *RIG_MECHANISMS)),
-        ("B", ALTERNATIVE_FORMS),
-        ("C", UNCATALOGUED_MECHANISMS),
-        ("S", SENSOR_MECHANISMS),
-        ("L", LAW_MECHANISMS),
-        ("T", TREND_MECHANISMS),
-    )
-}
 
 #: Mechanisms hidden together that data can distinguish.
 PAIRS = (

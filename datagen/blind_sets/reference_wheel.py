@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar, final
 
 import numpy as np
@@ -78,7 +78,7 @@ class ContactPoints:
     """Stresses (Pa) at points of the arc; arrays (points, n)."""
 
     theta: Floats  # rad
-    angle_from_entry: Floats  # rad, entry angle less theta
+    travel: Floats  # m, that the shearing rim has turned through since the entry
     depth: Floats  # m, that sets the pressure
     shear_displacement: Floats  # m, shear displacement
     normal: Floats
@@ -88,7 +88,7 @@ class ContactPoints:
 
 @dataclass(frozen=True)
 class SoilReaction:
-    """Load carried (N), drawbar pull (N), torque (N m) and sinkage (m); arrays (n,).
+    """Load carried and drawbar pull (N), torque (N m), sinkage (m), entry angle (rad); (n,) each.
 
     NaN where the soil does not carry the load at any sinkage down to the hub.
     """
@@ -97,40 +97,32 @@ class SoilReaction:
     pull: Floats
     torque: Floats
     sinkage: Floats
+    entry: Floats
 
 
 @final
 @dataclass(frozen=True)
 class Mechanism:
-    """A mechanism: its name, the form of its law, its size and the stages at which it acts.
+    """A mechanism: its name, its size with a reference value and unit, and what it does.
 
-    Each function takes the value of its stage, the states that the value belongs to, and last the
-    size of the mechanism in `unit`; None at stages where it does not act. `form` names a law that
-    differs from that of the analyst's effect of the same name; it is empty where they agree.
+    acts: Function by stage, in the order in which they run. Each takes the value of its stage, the
+        states that the value belongs to, and last the size. `driven`: from reported to true slip
+        and load. `soil`: the soil under this wheel. `arc`: the rim in the soil. `shape`: normal
+        stress, the way from either end of the contact (0) to its largest stress (1), and that
+        largest stress; (points, n) but the last, (n,). `pressure`: normal stress and its depth,
+        (points, n). `shear`: the points of the contact. `force`: within the search for
+        equilibrium. `reading`: from the forces at equilibrium to the readings, for the true slip
+        and load.
+    form: Names a law that differs from that of the analyst's effect of the same name.
+    needs: The covariate, a field of `WheelState`, that must vary for it to have an effect.
     """
 
     name: str
     size: str
     reference: float
     unit: str
-    _: KW_ONLY
+    acts: dict[str, Callable[..., Any]]
     form: str = ""
-    #: from reported to true slip and load
-    driven: Callable[[WheelState, float], WheelState] | None = None
-    #: the soil under this wheel
-    soil: Callable[[WheelState, float], WheelState] | None = None
-    arc: Callable[[ContactArc, WheelState, float], ContactArc] | None = None
-    #: normal stress, the way from either end of the contact (0) to its largest stress (1), and that
-    #: largest stress; (points, n) but the last, (n,)
-    shape: Callable[[Floats, Floats, Floats, WheelState, float], Floats] | None = None
-    #: normal stress and its depth, (points, n)
-    pressure: Callable[[Floats, Floats, WheelState, float], Floats] | None = None
-    shear: Callable[[ContactPoints, ContactArc, WheelState, float], Floats] | None = None
-    #: within the search for equilibrium
-    force: Callable[[SoilReaction, ContactArc, WheelState, float], SoilReaction] | None = None
-    #: from the forces at equilibrium to the readings, for the true slip and load
-    reading: Callable[[SoilReaction, WheelState, float], SoilReaction] | None = None
-    #: the covariate, a field of `WheelState`, that must vary for the mechanism to have an effect
     needs: str = ""
 
     @property
@@ -139,18 +131,33 @@ class Mechanism:
         return f"{self.name}/{self.form}" if self.form else self.name
 
 
+#: Tier -> mechanism by its key. A: textbook form, soil, wheel and rig; B: alternative form; C: in
+#: no catalogue of the analyst; S: sensors; L: another law of the soil; T: a soil that changes.
+MECHANISMS: dict[str, dict[str, Mechanism]] = {tier: {} for tier in "ABCSLT"}
+Act = TypeVar("Act", bound=Callable[..., Any])
+
+
+def mechanism(
+    tier: str, name: str, size: str, reference: float, unit: str, stage: str, **more: str
+) -> Callable[[Act], Act]:
+    """Declare what a mechanism of a tier does at one stage; `more` are its form and its needs."""
+
+    def declared(act: Act) -> Act:
+        own = Mechanism(name, size, reference, unit, {}, **more)
+        MECHANISMS[tier].setdefault(own.key, own).acts[stage] = act
+        return act
+
+    return declared
+
+
 #: Mechanisms that act together, each with its size.
 ActiveMechanisms = tuple[tuple[Mechanism, float], ...]
 
 
-def _quadrature() -> tuple[Floats, Floats]:
-    """Gauss-Legendre nodes and weights on 0 to 1 in t, with x = t^2: dense where stress begins."""
-    x, w = np.polynomial.legendre.leggauss(NODES)
-    t = 0.5 * (x + 1.0)
-    return (t * t)[:, None], (w * t)[:, None]
-
-
-NODE, WEIGHT = _quadrature()
+#: Gauss-Legendre nodes and weights on 0 to 1 in t, with x = t^2: dense where stress begins.
+_X, _W = np.polynomial.legendre.leggauss(NODES)
+_T = 0.5 * (_X + 1.0)
+NODE, WEIGHT = (_T * _T)[:, None], (_W * _T)[:, None]
 #: Of the points of both halves of a contact, the way from its end to the largest stress.
 WAY = np.concatenate([NODE, NODE])
 
@@ -170,7 +177,7 @@ def solve_equilibrium(rows: WheelState, active: ActiveMechanisms = ()) -> SoilRe
 def _changed(value: State, stage: str, active: ActiveMechanisms, *of: Any) -> State:
     """The value of a stage after all mechanisms that act there; `of` are the states it is of."""
     for mechanism, size in active:
-        if (act := getattr(mechanism, stage)) is not None:
+        if act := mechanism.acts.get(stage):
             value = act(value, *of, size)
     return value
 
@@ -191,7 +198,16 @@ def ground_reaction(
     1 / (1 + s) when braking; tau has the sign of j, so that all forces are continuous in slip.
     Source: Wong and Reece 1967, parts 1 and 2.
     """
-    arc = _arc(depth_angle, rows, active)
+    arc = ContactArc(
+        entry=depth_angle,
+        exit=np.zeros_like(depth_angle),
+        peak=(rows.a0 + rows.a1 * rows.slip) * depth_angle,
+        sinkage=2.0 * rows.radius * np.sin(0.5 * depth_angle) ** 2,
+        radius=rows.radius,
+        shear_radius=rows.radius,
+        lever=rows.radius,
+    )
+    arc = _changed(arc, "arc", active, rows)
     front, rear = arc.entry - arc.peak, arc.peak - arc.exit
     swept_angle = np.concatenate([NODE * front, front + (1.0 - NODE) * rear])
     mapped = np.concatenate([NODE * front, NODE * front])
@@ -205,23 +221,11 @@ def ground_reaction(
         pull=np.sum((points.shear * cos - points.normal * sin) * area, axis=0),
         torque=np.sum(points.shear * arc.lever * area, axis=0),
         sinkage=arc.sinkage,
+        entry=arc.entry,
     )
-    reaction = _changed(reaction, "force", active, arc, rows)
+    reaction = _changed(reaction, "force", active, rows)
     inside = (arc.exit < arc.peak) & (arc.peak < arc.entry)
     return replace(reaction, load=np.where(inside, reaction.load, np.nan))
-
-
-def _arc(depth_angle: Floats, rows: WheelState, active: ActiveMechanisms) -> ContactArc:
-    arc = ContactArc(
-        entry=depth_angle,
-        exit=np.zeros_like(depth_angle),
-        peak=(rows.a0 + rows.a1 * rows.slip) * depth_angle,
-        sinkage=2.0 * rows.radius * np.sin(0.5 * depth_angle) ** 2,
-        radius=rows.radius,
-        shear_radius=rows.radius,
-        lever=rows.radius,
-    )
-    return _changed(arc, "arc", active, rows)
 
 
 def _points(
@@ -236,21 +240,22 @@ def _points(
     modulus = rows.kc / rows.width + rows.kphi
     normal = modulus * depth**rows.n
     for mechanism, size in active:
-        if mechanism.shape is not None:
+        if shape := mechanism.acts.get("shape"):
             front = arc.entry - arc.peak
             deepest = _cosine_difference(arc.peak, front, arc.entry) * arc.radius
-            normal = mechanism.shape(normal, WAY, modulus * deepest**rows.n, rows, size)
-        if mechanism.pressure is not None:
-            normal = mechanism.pressure(normal, depth, rows, size)
+            normal = shape(normal, WAY, modulus * deepest**rows.n, rows, size)
+        if pressure := mechanism.acts.get("pressure"):
+            normal = pressure(normal, depth, rows, size)
     strength = rows.cohesion + normal * np.tan(rows.friction_angle)
     sine_difference = 2.0 * np.cos(0.5 * (arc.entry + theta)) * np.sin(0.5 * swept_angle)
     shear_displacement = arc.shear_radius * (swept_angle - rows.travel_ratio * sine_difference)
     mobilised = -np.expm1(-np.abs(shear_displacement) / rows.shear_modulus)
     shear = strength * np.copysign(mobilised, shear_displacement)
-    points = ContactPoints(theta, swept_angle, depth, shear_displacement, normal, strength, shear)
+    travel = arc.shear_radius * swept_angle
+    points = ContactPoints(theta, travel, depth, shear_displacement, normal, strength, shear)
     for mechanism, size in active:
-        if mechanism.shear is not None:
-            points = replace(points, shear=mechanism.shear(points, arc, rows, size))
+        if sheared := mechanism.acts.get("shear"):
+            points = replace(points, shear=sheared(points, rows, size))
     return points
 
 

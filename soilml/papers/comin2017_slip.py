@@ -16,7 +16,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import FitError
-from soilml.onboard.fusion_rules import FusedEstimate, inverse_variance, pairwise
+from soilml.onboard.fusion_rules import inverse_variance, pairwise
 from soilml.papers.published import printed
 from soilml.physics.gears import Midstance
 from soilml.physics.model import Model
@@ -113,17 +113,6 @@ def vibration_fit(planar: bool) -> Fit:
     }
 
 
-def fused_slip(torque: str, vibration: str) -> FusedEstimate:
-    """Fused slip from torque and vibration, with the standard deviations of table VI (in %)."""
-    std = 100.0 * np.asarray([TORQUE_SLIP[torque].slip_std, VIBRATION_SLIP[vibration].slip_std])
-    return inverse_variance(np.zeros(2), std)
-
-
-def fused_soil(name: str) -> FusedEstimate:
-    """Three estimates of a property fused by eq. 30, with the std of table VIII (%)."""
-    return pairwise(np.zeros(3), np.asarray(STD[name]))
-
-
 @cache
 def efficiency(name: str) -> float:
     """Pull efficiency (%) of a wheel of the 300 kg rover, one of six, on a soil of table I."""
@@ -152,12 +141,6 @@ def fused_error(ground: str, part: str, name: str) -> float:
     weights = (PRINTED[f"t9_{sense}_{name}_weight"] for sense in "tvs")
     errors = (PRINTED[f"t8_{model}_{ground}_{part}_mean"] for model in FUSED)
     return sum(w * e for w, e in zip(weights, errors, strict=True))
-
-
-def _error_gain(sense: int, part: str, name: str) -> float:
-    """Change of the size of the mean error (%) by fusion, over all soils."""
-    alone = PRINTED[f"t8_{FUSED[sense]}_all_soils_{part}_mean"]
-    return abs(fused_error("all_soils", part, name)) - abs(alone)
 
 
 @cache
@@ -208,23 +191,31 @@ COMPUTED: dict[str, Callable[[], float]] = {
 
 
 def _of_slips(torque: str, vibration: str) -> dict[str, Callable[[], float]]:
-    """Weight of torque, and the change of each standard deviation (%) by fusion of slips."""
+    """Weight of torque, and the change of each standard deviation (%) by fusion of slips.
+
+    With the standard deviations of table VI.
+    """
     alone = [100.0 * r.slip_std for r in (TORQUE_SLIP[torque], VIBRATION_SLIP[vibration])]
-    key = f"t6_{torque[0]}{vibration[0]}"
+    key, fused = f"t6_{torque[0]}{vibration[0]}", inverse_variance(np.zeros(2), np.asarray(alone))
     return {
-        f"{key}_weight": lambda: float(fused_slip(torque, vibration).weights[0]),
-        f"{key}_std_t": lambda: float(fused_slip(torque, vibration).std) - alone[0],
-        f"{key}_std_v": lambda: float(fused_slip(torque, vibration).std) - alone[1],
+        f"{key}_weight": lambda: fused.weights[0],
+        f"{key}_std_t": lambda: fused.std - alone[0],
+        f"{key}_std_v": lambda: fused.std - alone[1],
     }
 
 
 def _of_soils(name: str, index: int, part: str) -> dict[str, Callable[[], float]]:
-    """Weight of a sensor, and the change of standard deviation and mean error (%) by fusion."""
-    key = f"t9_{'tvs'[index]}_{name}"
+    """Weight of a sensor, and the change of standard deviation and mean error (%) by fusion.
+
+    Three estimates of a property fused by eq. 30, with the standard deviations of table VIII; the
+    mean error is that over all soils.
+    """
+    key, fused = f"t9_{'tvs'[index]}_{name}", pairwise(np.zeros(3), np.asarray(STD[name]))
+    alone = abs(PRINTED[f"t8_{FUSED[index]}_all_soils_{part}_mean"])
     return {
-        f"{key}_weight": lambda: float(fused_soil(name).weights[index]),
-        f"{key}_std": lambda: float(fused_soil(name).std) - STD[name][index],
-        f"{key}_mean": lambda: _error_gain(index, part, name),
+        f"{key}_weight": lambda: fused.weights[index],
+        f"{key}_std": lambda: fused.std - STD[name][index],
+        f"{key}_mean": lambda: abs(fused_error("all_soils", part, name)) - alone,
     }
 
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from soilml.arrays import Array, Floats
-from soilml.systems.wheel_legs.gaits import gait_metrics
 from soilml.systems.wheel_legs.resistive_force import (
     FEET,
     GROUNDS,
@@ -20,7 +19,7 @@ from soilml.systems.wheel_legs.resistive_force import (
     resistance_terms,
     wheel_leg,
 )
-from soilml.systems.wheel_legs.walk import walk
+from soilml.systems.wheel_legs.walk import gait_metrics, walk
 
 #: Stiffnesses over which the paper compares feet, alpha_z from 0.4 to 1.0 N/cm^3, and the ground
 #: for the comparison of numbers of legs, the middle of that range, which is not printed; N/m^3.
@@ -86,9 +85,8 @@ def _lower(values: Array) -> int:
     return 1 + int(np.argmin(falls))
 
 
-@cache
-def _sinkage_fit() -> dict[str, float]:
-    """s_sigma, s_I and s_Z of eq. 29 and their R^2: walks on the four soils in three states.
+def _sinkage_fit(number: str) -> float:
+    """s_sigma, s_I or s_Z of eq. 29 or their R^2: walks on the four soils in three states.
 
     The normal stress on the plates is proportional to the depth (eq. 4), without sigma_0.
     """
@@ -105,7 +103,7 @@ def _sinkage_fit() -> dict[str, float]:
         "s_i": float(s_i),
         "s_z": float(s_z) / 100.0,
         "s_phi_r2": 1.0 - _left(angle, s_i + s_z * z),
-    }
+    }[number]
 
 
 def _left(values: Floats, fit: Floats) -> float:
@@ -160,10 +158,6 @@ SLOPE_RANKS = {
 }
 
 
-def _fitted(key: str) -> float:
-    return _sinkage_fit()[key]
-
-
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
     # of a flat plate pushed straight down, (rest + R z) upwards and against the travel
@@ -177,7 +171,10 @@ COMPUTED: dict[str, Callable[[], float]] = {
     "max_sinkage_six": lambda: 5 + int(np.argmin(_legs("sinkage_largest_m")[4:])),
     **{key: partial(_rank, *own) for key, own in RANKS.items()},
     **{key: partial(_slope_rank, *own) for key, own in SLOPE_RANKS.items()},
-    **{key: partial(_fitted, key) for key in ("s_sigma", "s_sigma_r2", "s_i", "s_z", "s_phi_r2")},
+    **{
+        key: partial(_sinkage_fit, key)
+        for key in ("s_sigma", "s_sigma_r2", "s_i", "s_z", "s_phi_r2")
+    },
 }
 
 

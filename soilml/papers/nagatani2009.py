@@ -30,6 +30,11 @@ SLOPES = {0.11: 0.0, 0.18: 2.0, 0.29: 4.0, 0.39: 6.0, 0.80: 8.0}
 SHIFT = 0.57
 WHEEL, SAND = SensingWheel(noise=0.0), soil("nagatani2009/toyoura_sand")
 WEIGHT = 28.92
+#: Fields of the wheel that the paper prints.
+SENSORS = (
+    *("radius", "width", "sensors", "diameter"),
+    *("interval", "rim_speed", "saturation", "deadband"),
+)
 
 
 @cache
@@ -39,10 +44,6 @@ def _through_sensors(slip: float) -> tuple[StressProfile, float]:
     true = balanced_arc(math.radians(30.0), at, WHEEL, SAND)
     profile = deconvolve(bin_stress(simulate_readings(true, WHEEL), WHEEL), WHEEL)
     return profile, WheelBalance.of(WHEEL, SAND).modulus(profile, at)
-
-
-def _modulus(slip: float) -> float:
-    return _through_sensors(slip)[1]
 
 
 def _arc() -> float:
@@ -63,14 +64,7 @@ def _shifted_arc() -> float:
 
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
-    "radius": lambda: float(SensingWheel().radius),
-    "width": lambda: float(SensingWheel().width),
-    "sensors": lambda: float(SensingWheel().sensors),
-    "diameter": lambda: float(SensingWheel().diameter),
-    "interval": lambda: float(SensingWheel().interval),
-    "rim_speed": lambda: float(SensingWheel().rim_speed),
-    "saturation": lambda: float(SensingWheel().saturation),
-    "deadband": lambda: float(SensingWheel().deadband),
+    **{name: partial(getattr, SensingWheel(), name) for name in SENSORS},
     "weight": lambda: WEIGHT,
     "cohesion": lambda: float(SAND.cohesion),
     "friction_angle": lambda: math.degrees(SAND.friction_angle),
@@ -78,5 +72,6 @@ COMPUTED: dict[str, Callable[[], float]] = {
     "arc": _arc,
     "arc_effect": _shifted_arc,
     # at the slips between, a comparison would be of two printed numbers
-    **{f"modulus_{round(100 * slip):02d}": partial(_modulus, slip) for slip in (0.11, 0.80)},
+    "modulus_11": lambda: _through_sensors(0.11)[1],
+    "modulus_80": lambda: _through_sensors(0.80)[1],
 }

@@ -38,11 +38,6 @@ STATUSES = {
 AGREEING = frozenset({"reproduced", "recovered", "arithmetic", "depends", "tuned"})
 #: Units of orders and counts, which papers state in words or draw; all others are quantities.
 ORDINAL = frozenset({"rank", "legs"})
-#: Columns of the CSV file of a chapter.
-COLUMNS = (
-    *("key", "what", "source", "unit", "published", "tolerance"),
-    *("status", "counted_with", "reason"),
-)
 
 
 @dataclass(frozen=True)

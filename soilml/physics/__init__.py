@@ -4,37 +4,15 @@
 stresses and their integrals. `forces` applies the effects (`effects`) to both. `sinkage_search`
 finds the sinkage at which the soil carries the load, and `equilibrium` the forces and readings
 there.
+Gears, soils and effects can be imported from `soilml`; the names below are beside those.
 """
 
-from soilml.physics.contact import Contact, Force, Stress
-from soilml.physics.effects import EFFECTS, Effect, EffectCard
-from soilml.physics.gears import GEARS, Gear, LinearWheel, Midstance, Track, Wheel
+from soilml.physics.contact import Contact, Stress
+from soilml.physics.gears.base import Gear
 from soilml.physics.load_case import LoadCase
-from soilml.physics.model import Model, Profile
-from soilml.physics.operating_point import Operating
+from soilml.physics.model import Profile
 from soilml.physics.pull_efficiency import pull_efficiency, traffic_class
-from soilml.physics.soils import Soil, soil, soil_catalogue
 
 __all__ = [
-    "EFFECTS",
-    "GEARS",
-    "Contact",
-    "Effect",
-    "EffectCard",
-    "Force",
-    "Gear",
-    "LinearWheel",
-    "LoadCase",
-    "Midstance",
-    "Model",
-    "Operating",
-    "Profile",
-    "Soil",
-    "Stress",
-    "Track",
-    "Wheel",
-    "pull_efficiency",
-    "soil",
-    "soil_catalogue",
-    "traffic_class",
-]
+    "Contact", "Gear", "LoadCase", "Profile", "Stress", "pull_efficiency", "traffic_class",
+]  # fmt: skip

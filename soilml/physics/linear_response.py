@@ -66,45 +66,26 @@ def linear_response(
     with np.errstate(all="ignore"):  # rows without an answer are flagged, not warned about
         near = None if estimate is None else replace(estimate, rough=True)
         solved = in_chunks_near(rows(load_case, base_rows), equilibrium_forces, near)
-        evaluated = xp.concat([everything, base_rows], axis=0)
-        sinkage = xp.concat(
-            [xp.take(solved.sinkage, position, axis=0), solved.sinkage * math.exp(SINKAGE_STEP)],
-            axis=0,
-        )
+        # all rows at the sinkage of their base row, then base rows at one that is a little larger
+        deeper = solved.sinkage * math.exp(SINKAGE_STEP)
         at_sinkage = in_chunks(
-            rows(load_case, evaluated),
+            rows(load_case, xp.concat([everything, base_rows], axis=0)),
             lambda part, z: forces_at_sinkage(apply_input_effects(part), z),
-            sinkage,
+            xp.concat([xp.take(solved.sinkage, position, axis=0), deeper], axis=0),
         )
-        true_case = apply_input_effects(load_case)
-        return _first_order(true_case, base, base_rows, position, at_sinkage, solved.status)
-
-
-def _first_order(
-    true_case: LoadCase,
-    base: Array,
-    base_rows: Array,
-    position: Array,
-    at_sinkage: Force,
-    base_status: Array,
-) -> LinearResponse:
-    """The response, from the forces of all rows at the sinkage of their base row.
-
-    They are followed by those of the base rows at a sinkage that is larger by `SINKAGE_STEP`.
-    """
-    xp, size = namespace(base), base.shape[0]
-    here: dict[str, Array] = {f.name: getattr(at_sinkage, f.name)[:size] for f in fields(Force)}
-    rate: dict[str, Array] = {  # of the base rows, by the logarithm of sinkage
-        name: (getattr(at_sinkage, name)[size:] - value[base_rows]) / SINKAGE_STEP
-        for name, value in here.items()
-        if name != "status"
-    }
-    load = true_case.at.load + xp.zeros_like(here["load"])
-    rising = xp.where(rate["load"] > 0, rate["load"], xp.full_like(rate["load"], math.nan))
-    step = (load - here["load"]) / rising[position]
-    moved = {name: here[name] + rate[name][position] * step for name in rate}
-    moved |= {"load": load, "status": base_status[position]}
-    reading = apply_stage(true_case.effects, "on_reading", Force(**moved), true_case)
-    slope = rising / here["load"][base_rows]
-    sinkage = SinkageEstimate(xp.log(here["sinkage"]) + step, slope[position])
-    return LinearResponse(without_unsolved(reading), sinkage)
+        true_case, size = apply_input_effects(load_case), base.shape[0]
+        here: dict[str, Array] = {f.name: getattr(at_sinkage, f.name)[:size] for f in fields(Force)}
+        rate: dict[str, Array] = {  # of the base rows, by the logarithm of sinkage
+            name: (getattr(at_sinkage, name)[size:] - value[base_rows]) / SINKAGE_STEP
+            for name, value in here.items()
+            if name != "status"
+        }
+        load = true_case.at.load + xp.zeros_like(here["load"])
+        rising = xp.where(rate["load"] > 0, rate["load"], xp.full_like(rate["load"], math.nan))
+        step = (load - here["load"]) / rising[position]
+        moved = {name: here[name] + rate[name][position] * step for name in rate}
+        moved |= {"load": load, "status": solved.status[position]}
+        reading = apply_stage(true_case.effects, "on_reading", Force(**moved), true_case)
+        slope = rising / here["load"][base_rows]
+        sinkage = SinkageEstimate(xp.log(here["sinkage"]) + step, slope[position])
+        return LinearResponse(without_unsolved(reading), sinkage)

@@ -1,6 +1,8 @@
 """`soilml climb`: from a rover's files to the slope that it can climb."""
 
+import importlib.util
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +11,6 @@ from console import refused, rows_of
 from soilml.cli import main
 from soilml.io.text_tables import csv_text
 from soilml.systems.rim_stress import SimulatedRover
-from soilml.systems.rim_stress.simulation import climb_tables
 
 ROVER = """\
 [rover]
@@ -39,7 +40,12 @@ def true():
 def tables(true):
     rng = np.random.default_rng(6)
     climbs = true.simulate_climbs(rng, np.deg2rad([0.0, 4.0, 8.0]).tolist(), 2)
-    return climb_tables(climbs, *true.simulate_artificial_slip(rng, repeats=2), rim_speed=0.00915)
+    path = Path(__file__).parents[2] / "examples" / "make.py"
+    spec = importlib.util.spec_from_file_location("make_examples", path)
+    spec.loader.exec_module(make := importlib.util.module_from_spec(spec))
+    return make.climb_tables(
+        climbs, *true.simulate_artificial_slip(rng, repeats=2), rim_speed=0.00915
+    )
 
 
 @pytest.fixture

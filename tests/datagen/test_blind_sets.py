@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 
 from datagen.blind_sets import MECHANISMS, Plan, draw_blind_set, write_blind_set
-from datagen.blind_sets.law_families import (
-    LAW_MECHANISMS,
-)
 from datagen.blind_sets.reading_errors import CHANNELS
 from datagen.blind_sets.reference_wheel import (
     WheelState,
@@ -144,7 +141,7 @@ def state(count=1, **changed):
 def test_the_shape_acts_on_both_halves_of_the_contact_with_its_largest_stress():
     """With n = 1 and the ellipse, the load of the normal stress is that of a direct sum."""
     rows = state(cohesion=[0.0], friction_angle=[0.0], kc=[0.0])
-    cause = next(m for m in LAW_MECHANISMS if m.name == "elliptic-pressure")
+    cause = MECHANISMS["L"]["elliptic-pressure"]
     entry = np.array([0.5])
     load = ground_reaction(entry, rows, ((cause, 1.0),)).load[0]
     peak = (0.4 + 0.15 * 0.3) * 0.5

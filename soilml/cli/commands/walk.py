@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.option_values import parse_names, parse_numbers
     from soilml.cli.output import tell, write_columns
     from soilml.cli.progress import working
-    from soilml.systems.wheel_legs.gaits import walk_picture, walk_table
+    from soilml.systems.wheel_legs.walk import walk_picture, walk_table
 
     feet = parse_names(args.foot) or []
     counts = parse_numbers("--legs", args.legs)

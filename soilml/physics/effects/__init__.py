@@ -51,10 +51,9 @@ from soilml.physics.effects.sensors import SlipScale as SlipScale
 from soilml.physics.effects.sensors import SlipOffset as SlipOffset
 # fmt: on
 
-_CATALOGUE = {
-    name: value
-    for name, value in list(globals().items())
-    if isinstance(value, type) and issubclass(value, Effect) and value is not Effect
-}
 #: Effect by the name that `[[effect]] name` takes in a model file.
-EFFECTS: dict[str, type[Effect]] = {own.name: own for own in _CATALOGUE.values()}
+EFFECTS: dict[str, type[Effect]] = {
+    own.name: own
+    for own in list(globals().values())
+    if isinstance(own, type) and issubclass(own, Effect) and own is not Effect
+}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Annotated, Any, ClassVar, TypeVar, dataclass_transform, final
 
@@ -49,10 +49,10 @@ class EffectCard:
     #: its size and a value of it that matters on a small rover; the first parameter named here is
     #: the one that a search for missing effects fits
     reference: dict[str, float]
-    #: sign of the change that the reference size makes, channel -> -1 or +1, driving at slip > 0.1
-    signs: dict[str, int]
     #: runs that would distinguish it from other effects
     isolate: str
+    #: sign of the change that the reference size makes, channel -> -1 or +1, driving at slip > 0.1
+    signs: dict[str, int] = field(default_factory=dict)
     #: fields of `Operating` that must be given, and must vary for the effect to be identifiable
     needs: tuple[str, ...] = ()
     #: fields of `Operating` that it uses where they are known
@@ -83,32 +83,6 @@ class Effect:
 
     Raises `InputError` when a subclass is defined with a public method that begins with ``on_`` and
     is not one of `STAGES`.
-
-    Examples
-    --------
-    A sensor that reads 2 mm too deep:
-
-    >>> from dataclasses import replace
-    >>> from typing import Annotated
-    >>> from soilml.arrays import Real
-    >>> from soilml.parameters import Parameter
-    >>> from soilml.physics.effects import Effect, effect
-    >>> @effect(
-    ...     "zero",
-    ...     text="the zero of the sinkage sensor is off",
-    ...     source="linear sensor error",
-    ...     kind="sensor",
-    ...     reference={"offset": 0.002},
-    ...     signs={"sinkage": +1},
-    ...     isolate="the wheel on a plate",
-    ... )
-    ... class Zero(Effect):
-    ...     offset: Annotated[Real, Parameter("m", -0.05, 0.05)] = 0.0
-    ...
-    ...     def on_reading(self, force, load_case):
-    ...         return replace(force, sinkage=force.sinkage + self.offset)
-    >>> Zero(offset=0.002).overrides("on_reading"), Zero.overrides("on_force")
-    (True, False)
     """
 
     name: ClassVar[str]
@@ -167,10 +141,14 @@ E = TypeVar("E", bound=Effect)
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 def effect(name: str, **card: Any) -> Callable[[type[E]], type[E]]:
-    """Declare an effect: a frozen dataclass with this name and a card, see `EffectCard`."""
+    """Declare an effect: a frozen dataclass with this name and a card, see `EffectCard`.
+
+    The card's text is by default the first sentence of the class's docstring.
+    """
 
     def made(cls: type[E]) -> type[E]:
-        cls.name, cls.about = name, EffectCard(**card)
+        said = (cls.__doc__ or name).partition("\n")[0].rstrip(".")
+        cls.name, cls.about = name, EffectCard(**{"text": said[0].lower() + said[1:]} | card)
         return dataclass(frozen=True, kw_only=True)(cls)
 
     return made

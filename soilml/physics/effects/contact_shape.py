@@ -18,7 +18,6 @@ from soilml.physics.load_case import LoadCase
 
 @effect(
     "exit-angle",
-    text="the rim touches the soil behind the axle too: theta_2 below zero",
     source="Ishigami et al. 2007, J. Field Robotics 24(3); Ding et al. 2011",
     kind="soil",
     reference={"kappa": 0.15},
@@ -26,7 +25,7 @@ from soilml.physics.load_case import LoadCase
     isolate="runs near zero slip; the wheel weighed on its stand",
 )
 class ExitAngle(SlipLoadScaling):
-    r"""The soil springs back, or clings, and touches the rim behind the axle too.
+    r"""The rim touches the soil behind the axle too: theta_2 below zero.
 
     .. math:: \theta_2 = -\arccos(1 - \kappa z / r) + b_0 \theta_1
 
@@ -58,7 +57,6 @@ class ExitAngle(SlipLoadScaling):
 
 @effect(
     "stress-shift",
-    text="stresses sit at the front of the contact: small wheels",
     source="Nagatani et al. 2009, IROS, sec. IV",
     kind="soil",
     reference={"shift": 0.2},
@@ -66,7 +64,7 @@ class ExitAngle(SlipLoadScaling):
     isolate="force sensors in the rim; the same soil under a larger wheel",
 )
 class StressShift(SlipLoadScaling):
-    r"""Under a small wheel the stressed arc is shorter than the contact and lies at its front.
+    r"""Stresses sit at the front of the contact: small wheels.
 
     .. math::
         \theta \leftarrow \theta + a (\theta_1 - \theta), \quad
@@ -93,7 +91,6 @@ class StressShift(SlipLoadScaling):
 
 @effect(
     "wheel-flexibility",
-    text="the wheel deflects under its load and touches along a longer arc",
     source="Bekker 1969; Schmid 1995, J. Terramechanics 32(1)",
     kind="wheel",
     reference={"compliance": 2e-5},
@@ -102,7 +99,7 @@ class StressShift(SlipLoadScaling):
     family="flexible rim",
 )
 class WheelFlexibility(SlipLoadScaling):
-    r"""A wheel that gives way touches the soil along a longer arc, as a larger rigid wheel would.
+    r"""The wheel deflects under its load and touches along a longer arc.
 
     .. math::
         r^* = r (1 + \delta / z), \quad \delta = C W, \quad
@@ -132,7 +129,6 @@ MOST_DEFLECTION = 0.3  # Largest deflection, as a fraction of the radius
 
 @effect(
     "flat-rim",
-    text="the rim gives way and lies flat on the soil along a chord",
     source="Bekker 1969; Wong, Theory of Ground Vehicles, ch. 2",
     kind="wheel",
     reference={"compliance": 2e-5},
@@ -141,7 +137,7 @@ MOST_DEFLECTION = 0.3  # Largest deflection, as a fraction of the radius
     family="flexible rim",
 )
 class FlatRim(SlipLoadScaling):
-    r"""A rim that gives way lies flat on the soil along a chord, before and behind the axle.
+    r"""The rim gives way and lies flat on the soil along a chord.
 
     .. math::
         \delta = C W, \quad \theta_c = \arccos(1 - \delta / r), \quad
@@ -175,7 +171,6 @@ class FlatRim(SlipLoadScaling):
 
 @effect(
     "clogging",
-    text="a larger wheel: soil on the rim or between lugs, or lugs, with the slip of the rim",
     source="Ding et al. 2011, J. Terramechanics 48(1), radius of shearing",
     kind="wheel",
     reference={"layer": 0.003},
@@ -183,7 +178,7 @@ class FlatRim(SlipLoadScaling):
     isolate="measure the lugs; the same runs with the wheel brushed clean before each",
 )
 class Clogging(SlipLoadScaling):
-    r"""Soil clings to the rim, or fills the room between its lugs: the wheel is a larger one.
+    r"""A larger wheel: soil on the rim or between lugs, or lugs, with the slip of the rim.
 
     .. math::
         r \leftarrow r + h, \quad \theta_1 = \arccos(1 - z / (r + h)), \quad

@@ -24,7 +24,6 @@ from soilml.physics.operating_point import Operating
 
 @effect(
     "bulldozing",
-    text="the wheel pushes a wall of soil before it: less drawbar pull",
     source="Bekker 1969; Wong, Theory of Ground Vehicles, ch. 2",
     kind="soil",
     reference={"share": 1.0},
@@ -32,7 +31,7 @@ from soilml.physics.operating_point import Operating
     isolate="the same runs driven the other way, which turns a slope around; heavier loads",
 )
 class Bulldozing(SlipLoadScaling):
-    r"""The wheel pushes a wall of soil before it; drawbar pull alone pays for it.
+    r"""The wheel pushes a wall of soil before it: less drawbar pull.
 
     .. math::
         R = b (0.67 c z K_c + \tfrac12 z^2 \gamma K_\gamma), \quad
@@ -69,7 +68,6 @@ class Bulldozing(SlipLoadScaling):
 
 @effect(
     "sidewall-shear",
-    text="the buried side walls shear the soil too: more torque and pull",
     source="geometry; Jaky 1944; Janosi and Hanamoto 1961",
     kind="soil",
     reference={"share": 1.0},
@@ -77,7 +75,7 @@ class Bulldozing(SlipLoadScaling):
     isolate="the same runs with a wheel of another width; heavier loads, which bury more wall",
 )
 class SidewallShear(SlipLoadScaling):
-    r"""The two side walls of the wheel shear the soil that they are buried in.
+    r"""The buried side walls shear the soil too: more torque and pull.
 
     .. math::
         A = \tfrac12 r^2 (\theta_1 - \sin\theta_1 \cos\theta_1), \quad
@@ -137,7 +135,6 @@ def buried(entry: Array) -> tuple[Array, Array]:
 
 @effect(
     "lateral-slip",
-    text="sliding sideways uses up shear strength that would drive",
     source="Yoshida and Ishigami 2004, IROS; Ishigami et al. 2007",
     kind="soil",
     reference={"share": 1.0},
@@ -146,7 +143,7 @@ def buried(entry: Array) -> tuple[Array, Array]:
     needs=("slip_angle",),
 )
 class LateralSlip(SlipLoadScaling):
-    r"""A wheel that slides sideways too shears the soil along its slip velocity.
+    r"""Sliding sideways uses up shear strength that would drive.
 
     .. math::
         j_y = a (1 - s) \tan\beta \; r (\theta_1 - \theta), \quad j = \sqrt{j_x^2 + j_y^2}, \quad
@@ -179,7 +176,6 @@ class LateralSlip(SlipLoadScaling):
 
 @effect(
     "bearing-friction",
-    text="friction of the bearing is in the measured torque",
     source="Coulomb friction",
     kind="rig",
     reference={"coefficient": 0.01},
@@ -188,7 +184,7 @@ class LateralSlip(SlipLoadScaling):
     calibration=0.005,
 )
 class BearingFriction(Effect):
-    r"""The motor turns the bearing too: its torque is more than what the soil asks for.
+    r"""Friction of the bearing is in the measured torque.
 
     .. math:: T' = T + \mu W r
 
@@ -207,7 +203,6 @@ class BearingFriction(Effect):
 
 @effect(
     "slope",
-    text="the bed is inclined: weight pulls the wheel back, or forward in reverse",
     source="statics of a body on a slope",
     kind="rig",
     reference={"angle": 0.0175},
@@ -216,7 +211,7 @@ class BearingFriction(Effect):
     calibration=0.005,
 )
 class Slope(Effect):
-    r"""The bed has an unnoticed slope: driving goes uphill, or downhill in reverse.
+    r"""The bed is inclined: weight pulls the wheel back, or forward in reverse.
 
     .. math:: W = W' \cos\alpha, \quad DP' = DP - d W' \sin\alpha
 
@@ -243,16 +238,14 @@ class Slope(Effect):
 
 @effect(
     "load-transfer",
-    text="drawbar pull presses the wheel down, or lifts it, past the load cell",
     source="moments about the rig's arm",
     kind="rig",
     reference={"ratio": 0.1},
-    signs={},
     isolate="weighing the wheel on its stand while the drawbar is pulled by hand",
     calibration=0.03,
 )
 class LoadTransfer(Effect):
-    r"""The rig presses the wheel down by more than its load cell says: the pull has a lever arm.
+    r"""Drawbar pull presses the wheel down, or lifts it, past the load cell.
 
     .. math:: W = W' + \frac{h}{L} DP + W_0
 
@@ -277,7 +270,6 @@ class LoadTransfer(Effect):
 
 @effect(
     "camber",
-    text="the wheel is inclined to the side: one edge digs in",
     source="geometry; slices across the width",
     kind="rig",
     reference={"angle": 0.15},
@@ -286,7 +278,7 @@ class LoadTransfer(Effect):
     calibration=0.03,
 )
 class Camber(Effect):
-    r"""The wheel is inclined to the side: its lower edge is deeper in the soil than the upper.
+    r"""The wheel is inclined to the side: one edge digs in.
 
     .. math::
         F = \frac{1}{b} \int_{-b/2}^{b/2} F(z + y \sin\gamma) dy

@@ -16,7 +16,6 @@ from soilml.physics.load_case import LoadCase
 
 @effect(
     "grousers",
-    text="lugs carry the soil around: it shears further out than the rim",
     source="Ding et al. 2011, J. Terramechanics 48(1)",
     kind="wheel",
     reference={"height": 0.01},
@@ -24,7 +23,7 @@ from soilml.physics.load_case import LoadCase
     isolate="the same runs with a wheel without lugs; a dead-weight check of the torque sensor",
 )
 class Grousers(SlipLoadScaling):
-    r"""Lugs carry the soil between them around: it shears further out than the rim.
+    r"""Lugs carry the soil around: it shears further out than the rim.
 
     .. math::
         r_s = r + \lambda h, \quad
@@ -66,7 +65,6 @@ class Grousers(SlipLoadScaling):
 
 @effect(
     "track-grousers",
-    text="grousers of a track shear soil on soil, and cohesion beside the track",
     source="Wang et al. 2018, J. Terramechanics 77, eqs. 10-14",
     kind="wheel",
     reference={"spacing": 0.8},
@@ -74,7 +72,7 @@ class Grousers(SlipLoadScaling):
     isolate="the same runs with a track without grousers",
 )
 class TrackGrousers(SlipLoadScaling):
-    r"""Between the tips of its grousers a track shears soil on soil, and soil beside the track.
+    r"""Grousers of a track shear soil on soil, and cohesion beside the track.
 
     .. math::
         \tau \leftarrow (1 - g) \tau + g \left[c \left(1 + \frac{2 h}{b}\right)

@@ -51,7 +51,6 @@ class StressShape(SlipLoadScaling):
 
 @effect(
     "elliptic-pressure",
-    text="normal stress has the shape of an ellipse along the contact",
     source="Johnson, Contact Mechanics, 1985, sec. 4.2",
     kind="soil",
     reference={"share": 0.5},
@@ -60,7 +59,7 @@ class StressShape(SlipLoadScaling):
     family="shape of normal stress",
 )
 class EllipticPressure(StressShape):
-    r"""The normal stress rises and falls along an ellipse, steeply at both ends of the contact.
+    r"""Normal stress has the shape of an ellipse along the contact.
 
     .. math:: f = \sqrt{1 - \xi^2}
 
@@ -78,7 +77,6 @@ class EllipticPressure(StressShape):
 
 @effect(
     "parabolic-pressure",
-    text="normal stress has the shape of a parabola along the contact",
     source="Soehne 1953, Grundlagen der Landtechnik 5",
     kind="soil",
     reference={"share": 0.5},
@@ -87,7 +85,7 @@ class EllipticPressure(StressShape):
     family="shape of normal stress",
 )
 class ParabolicPressure(StressShape):
-    r"""The normal stress rises and falls along a parabola between the ends of the contact.
+    r"""Normal stress has the shape of a parabola along the contact.
 
     .. math:: f = 1 - \xi^2
 
@@ -110,7 +108,6 @@ class PressureLaw(SlipLoadScaling):
 
 @effect(
     "saturating-pressure",
-    text="pressure approaches a limit with depth: heavy wheels sink further",
     source="Wong, Theory of Ground Vehicles, ch. 2; Kacigin and Guskov 1968",
     kind="soil",
     reference={"softness": 2e-5},
@@ -119,7 +116,7 @@ class PressureLaw(SlipLoadScaling):
     family="pressure by sinkage",
 )
 class SaturatingPressure(PressureLaw):
-    r"""The pressure approaches a limit as the gear sinks: the soil yields instead of hardening.
+    r"""Pressure approaches a limit with depth: heavy wheels sink further.
 
     .. math:: \sigma \leftarrow \frac{1 - e^{-a \sigma}}{a}, \qquad \sigma_\infty = 1 / a
 
@@ -140,7 +137,6 @@ class SaturatingPressure(PressureLaw):
 
 @effect(
     "firm-base",
-    text="a firm base below loose soil stops the wheel",
     source="Wong, Theory of Ground Vehicles, ch. 2",
     kind="soil",
     reference={"nearness": 40.0},
@@ -149,7 +145,7 @@ class SaturatingPressure(PressureLaw):
     family="pressure by sinkage",
 )
 class FirmBase(PressureLaw):
-    r"""Loose soil lies on a firm base: below a depth the pressure rises steeply.
+    r"""A firm base below loose soil stops the wheel.
 
     .. math:: \sigma \leftarrow \sigma [1 + (a z)^m], \qquad H = 1 / a
 
@@ -172,7 +168,6 @@ class FirmBase(PressureLaw):
 
 @effect(
     "soft-crust",
-    text="a soft layer on firmer ground carries less than the ground",
     source="Wong, Theory of Ground Vehicles, ch. 2",
     kind="soil",
     reference={"deficit": 1500.0},
@@ -181,7 +176,7 @@ class FirmBase(PressureLaw):
     family="pressure by sinkage",
 )
 class SoftCrust(PressureLaw):
-    r"""A soft or loose layer lies on firmer ground: the pressure lacks a share at small depth.
+    r"""A soft layer on firmer ground carries less than the ground.
 
     .. math:: \sigma \leftarrow \sigma - p_0 (1 - e^{-\sigma / p_0})
 
@@ -207,18 +202,16 @@ AT_WIDTH = 0.1  # Width (m) at which Reece's law and Bekker's have the same k_c 
 
 @effect(
     "reece-width",
-    text="pressure depends on sinkage over width: stiffness changes with width otherwise",
     source="Reece 1965, Proc. Inst. Mech. Eng. 180(2A)",
     kind="soil",
     reference={"share": 1.0},
-    signs={},
     varied="wheels of several widths: with one it is a change of kc and kphi",
     varied_dimension="width",
     isolate="the same runs with a wheel of another width; plate tests with several plates",
     family="pressure by sinkage",
 )
 class ReeceWidth(SlipLoadScaling):
-    r"""Pressure depends on sinkage over width, as Reece wrote it, and not on sinkage alone.
+    r"""Pressure depends on sinkage over width: stiffness changes with width otherwise.
 
     .. math::
         \sigma = (k_1 + k_2 b) \left(\frac{z}{b}\right)^n
@@ -248,7 +241,6 @@ LARGE = 0.5  # Diameter (m) from which the curve of a plate holds for wheels
 
 @effect(
     "small-wheel-stiffness",
-    text="the soil's stiffness depends on the diameter of the wheel",
     source="Meirion-Griffith and Spenko 2011, J. Terramechanics 48(2)",
     kind="soil",
     reference={"exponent": -0.3},
@@ -258,7 +250,7 @@ LARGE = 0.5  # Diameter (m) from which the curve of a plate holds for wheels
     isolate="the same runs with a wheel of another diameter; plate tests of the soil",
 )
 class SmallWheelStiffness(SlipLoadScaling):
-    r"""The pressure-sinkage curve depends on how large the wheel is.
+    r"""The soil's stiffness depends on the diameter of the wheel.
 
     .. math:: \sigma = k z^n (D / D_0)^m, \quad D = 2 r, \quad D_0 = 0.5 m
 

@@ -185,7 +185,6 @@ class LoadGain(Effect):
 
 @effect(
     "load-hysteresis",
-    text="the load cell lags behind loads that rise and fall",
     source="ISO 376, reversibility error",
     kind="sensor",
     reference={"error": 0.03},
@@ -195,7 +194,7 @@ class LoadGain(Effect):
     calibration=0.01,
 )
 class LoadHysteresis(Effect):
-    r"""The load cell lags: it reads too little while loads rise, too much while they fall.
+    r"""The load cell lags behind loads that rise and fall.
 
     .. math:: W' = (1 - e d) W
 
@@ -215,7 +214,6 @@ class LoadHysteresis(Effect):
 
 @effect(
     "slip-offset",
-    text="the reported slip is off by a constant",
     source="linear sensor error",
     kind="sensor",
     reference={"offset": 0.015},
@@ -224,7 +222,7 @@ class LoadHysteresis(Effect):
     calibration=0.01,
 )
 class SlipOffset(Effect):
-    r"""The reported slip is off by the same amount in all rows.
+    r"""The reported slip is off by a constant.
 
     .. math:: s = s' - s_0
 
@@ -242,7 +240,6 @@ class SlipOffset(Effect):
 
 @effect(
     "slip-scale",
-    text="travel speed or wheel radius is off, and slip with it",
     source="definition of slip",
     kind="sensor",
     reference={"error": 0.015},
@@ -251,7 +248,7 @@ class SlipOffset(Effect):
     calibration=0.01,
 )
 class SlipScale(Effect):
-    r"""Travel speed, or the wheel's radius, is known wrongly, and slip with it.
+    r"""Travel speed or wheel radius is off, and slip with it.
 
     .. math::
         1 - s' = (1 - s) (1 + e) \text{ driving}, \quad

@@ -15,16 +15,14 @@ from soilml.physics.load_case import LoadCase
 
 @effect(
     "shear-softening",
-    text="shear stress peaks and falls to a residual: dense sand, crusts",
     source="Wong, Theory of Ground Vehicles, ch. 2; Wang et al. 2018, eq. 6",
     kind="soil",
     reference={"share": 0.5},
-    signs={},
     isolate="a shear-ring test of the soil; runs from the smallest to the largest slip",
     family="shear law",
 )
 class ShearSoftening(SlipLoadScaling):
-    r"""The shear stress peaks and falls to a residual, as in dense sand.
+    r"""Shear stress peaks and falls to a residual: dense sand, crusts.
 
     .. math::
         m_W = K_r \left\{1 + \left[\frac{1}{K_r (1 - 1/e)} - 1\right] e^{1 - j / K_w}\right\}
@@ -57,7 +55,6 @@ class ShearSoftening(SlipLoadScaling):
 
 @effect(
     "hyperbolic-shear",
-    text="shear stress rises along a hyperbola and mobilises its full strength late",
     source="Kondner 1963; Duncan and Chang 1970, ASCE 96(SM5)",
     kind="soil",
     reference={"share": 0.5},
@@ -66,7 +63,7 @@ class ShearSoftening(SlipLoadScaling):
     family="shear law",
 )
 class HyperbolicShear(SlipLoadScaling):
-    r"""The shear stress follows a hyperbola: it starts as steeply and reaches the strength later.
+    r"""Shear stress rises along a hyperbola and mobilises its full strength late.
 
     .. math::
         m_h = \frac{j}{K + j}, \qquad
@@ -102,16 +99,14 @@ AT_STRESS, SMALLEST_STRESS = 1e4, 1e-20
 
 @effect(
     "curved-envelope",
-    text="the strength envelope is curved: friction falls with the normal stress",
     source="Charles and Watts 1980, Geotechnique 30(4); Baker 2004",
     kind="soil",
     reference={"exponent": 0.2},
-    signs={},
     isolate="shear tests of the soil under a wide range of pressures; a wide range of loads",
     family="strength envelope",
 )
 class CurvedEnvelope(SlipLoadScaling):
-    r"""The envelope of strength is curved: friction falls with the normal stress.
+    r"""The strength envelope is curved: friction falls with the normal stress.
 
     .. math::
         \tau_{max} = c + \sigma \tan\varphi \left(\frac{\sigma}{\sigma_0}\right)^{-a}, \quad

@@ -16,7 +16,6 @@ from soilml.physics.soils import Soil
 
 @effect(
     "slip-sinkage",
-    text="a slipping wheel digs itself in: n grows with slip",
     source="Ding et al. 2011, J. Terramechanics 48(1)",
     kind="soil",
     reference={"n1": 0.4},
@@ -24,22 +23,13 @@ from soilml.physics.soils import Soil
     isolate="runs at several slips under one load, with sinkage measured",
 )
 class SlipSinkage(SlipLoadScaling):
-    r"""A slipping wheel digs itself in: the exponent of sinkage grows with slip.
+    r"""A slipping wheel digs itself in: n grows with slip.
 
     .. math:: n = n_0 + n_1 |s|
 
     References: Ding, Gao, Deng, Nagatani and Yoshida, J. Terramechanics 48(1), 2011, the
     slip-dependent exponent. An empirical law for small lugged wheels in dry sand; it does not
     describe how long digging takes.
-
-    Examples
-    --------
-    >>> from soilml import Model, Operating, SlipSinkage, Wheel, soil
-    >>> wheel, sand = Model(Wheel(radius=0.15, width=0.12)), soil("wong1989/dry_sand")
-    >>> at = Operating(slip=0.6, load=60.0)
-    >>> digging = (wheel + SlipSinkage(n1=0.4))(sand, at).sinkage / wheel(sand, at).sinkage
-    >>> f"{digging:.1f} times as deep"
-    '1.8 times as deep'
     """
 
     n1: Annotated[Real, Parameter("1", 0.0, 2.0, "growth of n per unit slip")] = 0.0
@@ -51,7 +41,6 @@ class SlipSinkage(SlipLoadScaling):
 
 @effect(
     "depth-cohesion",
-    text="cohesion grows with depth: more shear stress under deeper wheels",
     source="Lunar Sourcebook 1991, ch. 9",
     kind="soil",
     reference={"c1": 2e4},
@@ -59,7 +48,7 @@ class SlipSinkage(SlipLoadScaling):
     isolate="shear tests of soil taken from several depths; a wide range of loads",
 )
 class DepthCohesion(SlipLoadScaling):
-    r"""The soil holds together better further down, where it is packed more densely.
+    r"""Cohesion grows with depth: more shear stress under deeper wheels.
 
     .. math:: c(z) = c + c_1 z, \qquad \tau \leftarrow \tau + c_1 z (1 - e^{-|j| / K})
 
@@ -86,16 +75,14 @@ AT_SPEED, SLOWEST = 0.05, 1e-6
 
 @effect(
     "rate",
-    text="shear strength changes with the travel speed",
     source="Mitchell and Soga 2005, ch. 12",
     kind="soil",
     reference={"a": 0.05},
-    signs={},
     isolate="the same runs at another speed, ten times slower or faster",
     needs=("speed",),
 )
 class Rate(SlipLoadScaling):
-    r"""The soil resists shear more, or less, the faster the wheel travels.
+    r"""Shear strength changes with the travel speed.
 
     .. math:: \tau \leftarrow \tau \left(1 + a \ln\frac{|v|}{v_0}\right), \quad v_0 = 0.05 m/s
 
@@ -117,7 +104,6 @@ class Rate(SlipLoadScaling):
 
 @effect(
     "multipass",
-    text="soil in a rut is firmer than virgin soil",
     source="Holm 1969; Senatore and Sandu 2011, J. Terramechanics 48(4)",
     kind="soil",
     reference={"growth": 0.5},
@@ -126,7 +112,7 @@ class Rate(SlipLoadScaling):
     needs=("pass_number",),
 )
 class Multipass(SlipLoadScaling):
-    r"""A rut is firmer than virgin soil: each wheel that passed has compacted it.
+    r"""Soil in a rut is firmer than virgin soil.
 
     .. math:: k \leftarrow k N^a, \quad k \in \{k_c, k_\varphi\}
 
@@ -165,7 +151,6 @@ class Drift(SlipLoadScaling):
 
 @effect(
     "bearing-drift",
-    text="the soil becomes firmer or softer during the campaign",
     source="Mitchell and Soga 2005, ch. 12",
     kind="soil",
     reference={"growth": 0.2},
@@ -174,7 +159,7 @@ class Drift(SlipLoadScaling):
     uses=("progress",),
 )
 class BearingDrift(Drift):
-    r"""The soil becomes firmer, or softer, during the campaign.
+    r"""The soil becomes firmer or softer during the campaign.
 
     .. math:: k \leftarrow k e^{a p}, \quad k \in \{k_c, k_\varphi\}
 
@@ -193,7 +178,6 @@ class BearingDrift(Drift):
 
 @effect(
     "cohesion-drift",
-    text="the soil gains or loses cohesion during the campaign: drying, wetting",
     source="Fredlund et al. 1978, Can. Geotech. J. 15(3)",
     kind="soil",
     reference={"gain": 500.0},
@@ -202,7 +186,7 @@ class BearingDrift(Drift):
     uses=("progress",),
 )
 class CohesionDrift(Drift):
-    r"""The soil gains or loses cohesion during the campaign, as it dries or is wetted.
+    r"""The soil gains or loses cohesion during the campaign: drying, wetting.
 
     .. math:: c \leftarrow \max(c + c_1 p, 0)
 
@@ -220,7 +204,6 @@ class CohesionDrift(Drift):
 
 @effect(
     "friction-drift",
-    text="the friction angle grows or falls during the campaign: compaction, loosening",
     source="Bolton 1986, Geotechnique 36(1)",
     kind="soil",
     reference={"gain": 0.05},
@@ -229,7 +212,7 @@ class CohesionDrift(Drift):
     uses=("progress",),
 )
 class FrictionDrift(Drift):
-    r"""The friction angle grows or falls during the campaign, as the soil is compacted or loosened.
+    r"""The friction angle grows or falls during the campaign: compaction, loosening.
 
     .. math:: \varphi \leftarrow \max(\varphi + \varphi_1 p, 0)
 

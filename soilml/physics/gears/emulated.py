@@ -73,10 +73,11 @@ class EmulatedGear:
 
     def fractions(self, x: Floats) -> Floats:
         """Inputs (m, d) as points of the unit cube."""
-        log = np.asarray(self.logarithmic)
-        low, high = (np.where(log, np.log(np.maximum(end, 1e-300)), end) for end in self._ends)
-        x = np.where(log, np.log(np.maximum(x, 1e-300)), x)
-        return np.asarray((x - low) / (high - low))
+        low, high, at = (
+            np.where(self.logarithmic, np.log(np.maximum(v, 1e-300)), v)
+            for v in (self.lower, self.upper, x)
+        )
+        return np.asarray((at - low) / (high - low))
 
     def beyond(self, name: str, values: Floats) -> NDArray[np.bool_]:
         """Whether values (m,) of an input lie farther beyond the design than `MARGIN`."""
@@ -90,17 +91,6 @@ class EmulatedGear:
         """A range of an input without what lies beyond the design."""
         i = self.inputs.index(name)
         return max(ends[0], self.lower[i]), min(ends[1], self.upper[i])
-
-    def values(self, u: Floats) -> Floats:
-        """Inputs (m, d) at points of the unit cube."""
-        log = np.asarray(self.logarithmic)
-        low, high = (np.where(log, np.log(np.maximum(end, 1e-300)), end) for end in self._ends)
-        x = low + u * (high - low)
-        return np.asarray(np.where(log, np.exp(np.where(log, x, 0.0)), x))
-
-    @property
-    def _ends(self) -> tuple[Floats, Floats]:
-        return np.asarray(self.lower), np.asarray(self.upper)
 
     def largest_sinkage(self) -> Real:
         """The radius (m): deeper wheels roll no more."""

@@ -57,12 +57,6 @@ def differences_from_entry(
     return u * (cos_entry + t * sin_entry), u * (sin_entry - t * cos_entry)
 
 
-def check_law(law: str) -> None:
-    """Raise `InputError` where there is no such law."""
-    if law not in get_args(BrakingLaw):
-        raise InputError(f"braking is {law!r}; there are: {', '.join(get_args(BrakingLaw))}")
-
-
 def displacement_slip(slip: Array, law: BrakingLaw) -> Array:
     r"""Slip s' of the shear displacement, of any shape.
 
@@ -290,7 +284,8 @@ class RigidWheel(RoundGear):
     braking: BrakingLaw = "displacement-sign"
 
     def __post_init__(self) -> None:
-        check_law(self.braking)
+        if self.braking not in (laws := get_args(BrakingLaw)):
+            raise InputError(f"braking is {self.braking!r}; there are: {', '.join(laws)}")
 
     @final
     def initial_sinkage(self, soil: Soil, at: Operating) -> Array:
@@ -325,7 +320,11 @@ def sliced_contact(rim: WheelArc, contact_of: Callable[[WheelArc], Contact]) -> 
     xp = namespace(rim.entry)
     lifted = LIFTED * rim.sinkage
     depths = (rim.sinkage + rim.tilt, xp.maximum(rim.sinkage - rim.tilt, lifted))
-    slices = [_at_depth(rim, depth) for depth in depths]
+    whole = entry_angle(rim.sinkage, rim.radius)
+    slices = [
+        rim.with_entry(rim.entry * (entry_angle(z, rim.radius) / whole), sinkage=z, tilt=None)
+        for z in depths
+    ]
     parts = [contact_of(own) for own in slices]
     points = [part.depth.shape[0] for part in parts]
 
@@ -341,8 +340,3 @@ def sliced_contact(rim: WheelArc, contact_of: Callable[[WheelArc], Contact]) -> 
         if getattr(getattr(parts[0], name), "ndim", 0) > 1:
             fields[name] = joined([getattr(part, name) for part in parts])
     return replace(parts[0], **fields, geometry=replace(rim, **angles))
-
-
-def _at_depth(rim: WheelArc, depth: Array) -> WheelArc:
-    share = entry_angle(depth, rim.radius) / entry_angle(rim.sinkage, rim.radius)
-    return rim.with_entry(rim.entry * share, sinkage=depth, tilt=None)

@@ -9,7 +9,6 @@ from soilml.numerics.quadrature import columns, crowded_ends, crowded_start, gau
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
 from soilml.physics.operating_point import Operating
 
-FRONT, MIDDLE, REAR = range(3)  # The three arcs of the belt
 #: Fraction of the peak pressure over which the shear of unloading soil fades out.
 FADING_PRESSURE = 0.05
 
@@ -37,26 +36,47 @@ class Belt:
     n: Real  # 1, exponent of sinkage of the soil
 
 
-def arc_radius(belt: Belt, arc: int) -> Real:
-    """Radius (m) of one of the three arcs."""
-    return belt.arc_radius if arc == MIDDLE else belt.radius
+@dataclass(frozen=True)
+class Arc:
+    """One of the three arcs of the belt, on the way from where it enters the soil."""
+
+    radius: Real  # m
+    turn: float  # 1 where the inclination rises along the arc, -1 where it falls
+    start: Array  # rad, inclination where the arc begins
+    along: Real  # m, distance along the belt to where it begins
+    horizontal: Real  # m, horizontal projection of that distance
+    level: Real  # m, height of its level point above the lowest point of the front wheel
+    lowest: Array  # m, depth from which the soil behind its level point was unloaded
+
+    def height(self, inclination: Array) -> Array:
+        """Height (m) of a point above the lowest point of the front wheel."""
+        rise = 2.0 * self.radius * namespace(inclination).sin(0.5 * inclination) ** 2
+        return self.level - self.turn * rise
+
+    def distance(self, inclination: Array) -> tuple[Array, Array]:
+        """Distance (m) along the belt from where it enters the soil, and its projection."""
+        sin, radius = namespace(inclination).sin, self.turn * self.radius
+        turned = sin(inclination) - sin(self.start)
+        along = self.along + radius * (inclination - self.start)
+        return along, self.horizontal + radius * turned
 
 
-def height_above_front(belt: Belt, arc: int, inclination: Array) -> Array:
-    """Height (m) of a point of the belt above the lowest point of the front wheel."""
-    xp = namespace(inclination)
-    sin_half_squared = xp.sin(0.5 * inclination) ** 2
-    if arc == FRONT:
-        return 2.0 * belt.radius * sin_half_squared
-    if arc == MIDDLE:
-        return middle_arc_top(belt) - 2.0 * belt.arc_radius * sin_half_squared
-    return belt.sinkage - belt.rear + 2.0 * belt.radius * sin_half_squared
-
-
-def middle_arc_top(belt: Belt) -> Array:
-    """Height (m) of the top of the middle arc above the lowest point of the front wheel."""
-    xp = namespace(belt.leave)
-    return 2.0 * (belt.radius + belt.arc_radius) * xp.sin(0.5 * belt.leave) ** 2
+def belt_arcs(belt: Belt) -> tuple[Arc, Arc, Arc]:
+    """The arcs around the front wheel, between the wheels and around the rear one."""
+    sin = namespace(belt.entry).sin
+    along = belt.radius * (belt.entry + belt.leave)
+    horizontal = belt.radius * (sin(belt.entry) + sin(belt.leave))
+    rear_along = along + belt.arc_radius * (belt.leave + belt.meet)
+    rear_horizontal = horizontal + belt.arc_radius * (sin(belt.leave) + sin(belt.meet))
+    higher, top = (
+        belt.sinkage - belt.rear,
+        2.0 * (belt.radius + belt.arc_radius) * sin(0.5 * belt.leave) ** 2,
+    )
+    return (
+        Arc(belt.radius, -1.0, belt.entry, 0.0, 0.0, 0.0, belt.sinkage),
+        Arc(belt.arc_radius, 1.0, -belt.leave, along, horizontal, top, belt.sinkage),
+        Arc(belt.radius, -1.0, belt.meet, rear_along, rear_horizontal, higher, belt.rear),
+    )
 
 
 def inclination_at_height(height: Array, radius: Real) -> Array:
@@ -68,29 +88,6 @@ def inclination_at_height(height: Array, radius: Real) -> Array:
     xp = namespace(height)
     sin_half_squared = xp.clip(height / (2.0 * radius), 1e-30, 0.99)
     return 2.0 * xp.asin(xp.sqrt(sin_half_squared))
-
-
-def distance_along(belt: Belt, arc: int, inclination: Array) -> tuple[Array, Array]:
-    """Distance (m) along the belt from where it enters the soil, and its horizontal projection."""
-    xp = namespace(inclination)
-    sin = xp.sin
-    # distances at the start of the arc; inclination there, and whether it rises along the arc
-    along = belt.radius * (belt.entry + belt.leave)
-    horizontal = belt.radius * (sin(belt.entry) + sin(belt.leave))
-    if arc == FRONT:
-        along, horizontal = 0.0 * along, 0.0 * horizontal
-        start, turn = belt.entry, -1.0
-    elif arc == MIDDLE:
-        start, turn = -belt.leave, 1.0
-    else:
-        along = along + belt.arc_radius * (belt.leave + belt.meet)
-        horizontal = horizontal + belt.arc_radius * (sin(belt.leave) + sin(belt.meet))
-        start, turn = belt.meet, -1.0
-    radius = turn * arc_radius(belt, arc)
-    return (
-        along + radius * (inclination - start),
-        horizontal + radius * (sin(inclination) - sin(start)),
-    )
 
 
 def equivalent_depth(belt: Belt, deepest: Array, height: Array) -> Array:
@@ -123,13 +120,14 @@ def shear_retention(belt: Belt, deepest: Array, height: Array) -> Array:
     return -xp.expm1(-xp.maximum(pressure, xp.zeros_like(pressure)) / FADING_PRESSURE)
 
 
-def belt_contact(belt: Belt, at: Operating, entry: int, middle: int, short: int) -> Contact:
+def belt_contact(belt: Belt, at: Operating, entry: int, between: int, short: int) -> Contact:
     """The points along the belt where it touches, by numbers of nodes.
 
     Eight segments end where the soil is unloaded, reloaded or released, or loaded deeper than
     before: on each of them the pressure follows one law.
     """
     xp = namespace(belt.entry)
+    front, middle, rear = belt_arcs(belt)
     level = xp.zeros_like(belt.entry)
     first, second = belt.sinkage, belt.rear
     further = second - first
@@ -137,10 +135,10 @@ def belt_contact(belt: Belt, at: Operating, entry: int, middle: int, short: int)
     # behind the front wheel:
     released = xp.minimum(inclination_at_height(belt.rebound * first, belt.radius), belt.leave)
     # on both sides of the top of the middle arc, whose inclination is counted from there:
-    off_ground = inclination_at_height(middle_arc_top(belt) - belt.rebound * first, belt.arc_radius)
+    off_ground = inclination_at_height(middle.level - belt.rebound * first, belt.arc_radius)
     off, on = xp.minimum(off_ground, belt.leave), xp.minimum(off_ground, belt.meet)
     # behind the top, where the belt comes back to the depth `first`:
-    deeper = xp.minimum(inclination_at_height(middle_arc_top(belt), belt.arc_radius), belt.meet)
+    deeper = xp.minimum(inclination_at_height(middle.level, belt.arc_radius), belt.meet)
     deeper = xp.maximum(deeper, on)
     # in front of the rear wheel, where it meets the rebounded soil, and the depth `first`:
     met = inclination_at_height(further + belt.rebound * first, belt.radius)
@@ -149,19 +147,19 @@ def belt_contact(belt: Belt, at: Operating, entry: int, middle: int, short: int)
     # behind the rear wheel, unloaded from the depth `second`:
     out = xp.minimum(inclination_at_height(belt.rebound * second, belt.radius), belt.exit)
     segments = (
-        (FRONT, belt.entry, level, crowded_start(entry)),
-        (FRONT, level, -released, gauss(short)),
-        (MIDDLE, -belt.leave, -off, crowded_ends(middle)),
-        (MIDDLE, on, deeper, crowded_ends(middle)),
-        (MIDDLE, deeper, belt.meet, gauss(short)),
-        (REAR, met, rear_deeper, gauss(short)),
-        (REAR, rear_deeper, level, gauss(short)),
-        (REAR, level, -out, gauss(short)),
+        (front, belt.entry, level, crowded_start(entry)),
+        (front, level, -released, gauss(short)),
+        (middle, -belt.leave, -off, crowded_ends(between)),
+        (middle, on, deeper, crowded_ends(between)),
+        (middle, deeper, belt.meet, gauss(short)),
+        (rear, met, rear_deeper, gauss(short)),
+        (rear, rear_deeper, level, gauss(short)),
+        (rear, level, -out, gauss(short)),
     )
     parts = []
     for arc, start, end, nodes in segments:
         x, weight = columns(nodes, belt.entry)
-        area = belt.width * arc_radius(belt, arc) * xp.abs(end - start) * weight
+        area = belt.width * arc.radius * xp.abs(end - start) * weight
         parts.append(_belt_points(belt, at, arc, start + (end - start) * x, area))
     by_point = (
         *("depth", "shear_displacement", "surface_travel"),
@@ -171,22 +169,21 @@ def belt_contact(belt: Belt, at: Operating, entry: int, middle: int, short: int)
     return replace(parts[0], **joined)
 
 
-def _belt_points(belt: Belt, at: Operating, arc: int, inclination: Array, area: Array) -> Contact:
+def _belt_points(belt: Belt, at: Operating, arc: Arc, inclination: Array, area: Array) -> Contact:
     """Points of one arc at inclinations (rad), each of an area (m^2); arrays (points, batch).
 
     A point presses the soil deeper than ever, or rests on soil that was unloaded from the depth of
     the front wheel, behind the lowest point of the rear wheel from that one's.
     """
     xp = namespace(inclination)
-    height = height_above_front(belt, arc, inclination)
-    along, horizontal = distance_along(belt, arc, inclination)
+    height = arc.height(inclination)
+    along, horizontal = arc.distance(inclination)
     behind = inclination < 0.0
-    depth, deepest = belt.sinkage - height, belt.sinkage + 0.0 * height
-    if arc == REAR:
-        deepest = xp.where(behind, belt.rear + 0.0 * height, deepest)
+    depth = belt.sinkage - height
+    deepest = xp.where(behind, arc.lowest + 0.0 * height, belt.sinkage + 0.0 * height)
     virgin = depth > deepest
     unloaded_by = deepest - depth
-    if arc == FRONT:  # as a product: near the entry a difference would lose its digits
+    if arc.start is belt.entry:  # as a product: near there a difference would lose its digits
         both = 0.5 * (belt.entry - inclination), 0.5 * (belt.entry + inclination)
         depth = 2.0 * belt.radius * xp.sin(both[0]) * xp.sin(both[1])
         virgin = ~behind
@@ -209,24 +206,23 @@ def belt_profile(belt: Belt, at: Operating, points: int) -> tuple[Array, Contact
     """Inclinations (rad) of evenly spaced points from entry to exit, and their contact."""
     xp = namespace(belt.entry)
     fraction = xp.linspace(0.0, 1.0, points, dtype=belt.entry.dtype)[:, None]
-    front_end = distance_along(belt, FRONT, -belt.leave)[0]
-    middle_end = distance_along(belt, MIDDLE, belt.meet)[0]
-    along = fraction * distance_along(belt, REAR, -belt.exit)[0]
+    arcs = belt_arcs(belt)
+    _, middle, rear = arcs
+    along = fraction * rear.distance(-belt.exit)[0]
     # inclination that the point would have on each of the three arcs
-    arcs = (
-        belt.entry - along / belt.radius,
-        (along - front_end) / belt.arc_radius - belt.leave,
-        belt.meet - (along - middle_end) / belt.radius,
-    )
+    angles = [arc.start + arc.turn * (along - arc.along) / arc.radius for arc in arcs]
     none = xp.zeros_like(along)
-    parts = [_belt_points(belt, at, arc, angle, none) for arc, angle in enumerate(arcs)]
+    parts = [
+        _belt_points(belt, at, arc, angle, none) for arc, angle in zip(arcs, angles, strict=True)
+    ]
 
-    def of_its_arc(front: Array, middle: Array, rear: Array) -> Array:
-        return xp.where(along < front_end, front, xp.where(along < middle_end, middle, rear))
+    def of_its_arc(values: list[Array]) -> Array:
+        front, between, last = values
+        return xp.where(along < middle.along, front, xp.where(along < rear.along, between, last))
 
-    return of_its_arc(*arcs), replace(
+    return of_its_arc(angles), replace(
         parts[0],
-        depth=of_its_arc(*(part.depth for part in parts)),
-        shear_displacement=of_its_arc(*(part.shear_displacement for part in parts)),
+        depth=of_its_arc([part.depth for part in parts]),
+        shear_displacement=of_its_arc([part.shear_displacement for part in parts]),
         surface_travel=along,
     )

@@ -30,7 +30,7 @@ class StressBySlip:
     Each profile is reduced to exit angle, entry angle and its shape at `POINTS` evenly spaced
     points, scaled to mean 1. Each of these numbers is fitted by a polynomial in slip, whose degree
     is the number of distinct slips less two, at least 1 and at most 3. Only the shape is kept,
-    because the load of the wheel determines the magnitude. Valid from `lowest` to `highest` slip.
+    because the load of the wheel determines the magnitude. Valid within the slips measured.
     References: Nagatani et al., section 5.2 and Figs. 5 and 7, which show that the stress at
     artificial slip on level ground equals that on a slope at the same slip.
     """
@@ -56,16 +56,6 @@ class StressBySlip:
         fitted = own.numbers(slip)
         freedom = max(len(slip) - degree - 1, 1)
         return cls(slip, fitted, (numbers - fitted) * np.sqrt(len(slip) / freedom), degree)
-
-    @property
-    def lowest(self) -> float:
-        """The smallest slip at which stress was measured."""
-        return float(self.slip.min())
-
-    @property
-    def highest(self) -> float:
-        """The largest slip at which stress was measured."""
-        return float(self.slip.max())
 
     def numbers(self, slips: Floats) -> Floats:
         """Exit, entry and shape (n, 2 + POINTS) at slips (n,), by least squares."""
@@ -197,26 +187,14 @@ def climbing_ability(
     References
     ----------
     Nagatani et al., section 7.
-
-    Examples
-    --------
-    >>> from soilml.numerics.quantiles import quantile_band
-    >>> from soilml.systems.rim_stress import SimulatedRover, identify_ground
-    >>> true, rng = SimulatedRover(), np.random.default_rng(0)
-    >>> climbs = true.simulate_climbs(rng, np.deg2rad([0.0, 4.0]).tolist(), repeats=2)
-    >>> sand = {"cohesion": 0.0, "friction_angle": 0.6632}
-    >>> ground = identify_ground(true.rover, climbs, fixed=sand)
-    >>> front, rear = true.simulate_artificial_slip(rng)
-    >>> ability = climbing_ability(ground, StressBySlip.fit(front), StressBySlip.fit(rear))
-    >>> round(float(np.rad2deg(quantile_band(ability.steepest).middle)))  # true: 13.2
-    13
     """
-    lowest, highest = max(front.lowest, rear.lowest), min(front.highest, rear.highest)
+    ends = [(wheel.slip.min(), wheel.slip.max()) for wheel in (front, rear)]
+    lowest, highest = max(low for low, _ in ends), min(high for _, high in ends)
     if not lowest < highest:
+        (a, b), (c, d) = ends
         raise FitError(
-            f"stress was measured on the front wheel at slips {front.lowest:.3g} to "
-            f"{front.highest:.3g} and on the rear at {rear.lowest:.3g} to {rear.highest:.3g}; "
-            "the two ranges must overlap"
+            f"stress was measured on the front wheel at slips {a:.3g} to {b:.3g} and on the rear "
+            f"at {c:.3g} to {d:.3g}; the two ranges must overlap"
         )
     rng = np.random.default_rng(seed)
     slip = np.linspace(lowest, highest, CURVE_SLIPS)

@@ -78,15 +78,6 @@ def force_components(
     slip: Negative for a braking wheel.
     modulus (...): k_x, m.
     radius, width: Of the wheel, m.
-
-    Examples
-    --------
-    >>> import math
-    >>> import numpy as np
-    >>> profile = StressProfile(np.array([-0.1, 0.2, 0.5]), np.array([0.0, 2e4, 0.0]))
-    >>> parts = force_components(profile, 0.3, 0.0072, 0.055, 0.064)
-    >>> round(float(force_of(parts, PULL, 1.0, 0.0, math.tan(0.66))), 2)
-    4.22
     """
     k = np.asarray(modulus, dtype=np.float64)
     angle, arc, normal = (part[:, None, None] for part in profile.nodes)

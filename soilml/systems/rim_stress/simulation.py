@@ -14,7 +14,6 @@ from soilml.errors import FitError, InputError
 from soilml.physics.soils import Soil
 from soilml.systems.rim_stress.ability import pull_and_slope_at
 from soilml.systems.rim_stress.climbs import (
-    WHEELS,
     Climb,
     Rover,
     ShearParameters,
@@ -30,7 +29,6 @@ ARTIFICIAL_SLIPS = (0.04, 0.13, 0.36, 0.68)
 SAMPLING = 0.0083  # rad between samples: a rim speed of 9.15 mm/s, r = 0.055 m, sampled every 50 ms
 CHORDS = 48  # Points across the diameter of a sensor
 HALVINGS = 40  # Bisection steps for the middle of an arc
-Columns = dict[str, list[object]]
 
 
 def simulate_readings(
@@ -198,40 +196,6 @@ class SimulatedRover:
         normal = normal * (1.0 + noise * np.clip(rng.normal(size=len(normal)), -3.0, 3.0))
         read = 1.0 - (1.0 - slip) * (1.0 + speed_error)
         return WheelRun(read, StressProfile(angle, normal), noise * normal)
-
-
-def climb_tables(
-    climbs: Sequence[Climb],
-    front: Sequence[WheelRun] = (),
-    rear: Sequence[WheelRun] = (),
-    *,
-    rim_speed: float,
-) -> tuple[Columns, Columns]:
-    """Tables (runs, stresses) of columns as they are read, with speeds by that of the rim (m/s).
-
-    `front` and `rear` are stresses at artificial slip, which become runs without a slope.
-    """
-    each = [
-        (climb.name, wheel, climb.slope, run)
-        for climb in climbs
-        for wheel, run in zip(WHEELS, climb.wheels, strict=True)
-    ]
-    for wheel, artificial in zip(WHEELS, (front, rear), strict=True):
-        each += [(f"flat_{wheel}_{i}", wheel, np.nan, r) for i, r in enumerate(artificial, 1)]
-    runs: Columns = {
-        "run": [name for name, _, _, _ in each],
-        "wheel": [wheel for _, wheel, _, _ in each],
-        "slope_rad": [slope for _, _, slope, _ in each],
-        "speed_m_s": [rim_speed * (1.0 - run.slip) for _, _, _, run in each],
-        "rim_speed_m_s": [rim_speed for _ in each],
-    }
-    samples = [
-        (name, wheel, float(angle), float(normal))
-        for name, wheel, _, run in each
-        for angle, normal in zip(run.profile.angle, run.profile.normal, strict=True)
-    ]
-    names = ("run", "wheel", "angle_rad", "normal_Pa")
-    return runs, {n: list(own) for n, own in zip(names, zip(*samples, strict=True), strict=True)}
 
 
 def parabolic_arc(

@@ -39,13 +39,6 @@ class StressProfile:
     References
     ----------
     Nagatani et al. 2009, section IV.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> profile = StressProfile(np.linspace(-0.2, 0.4, 7), np.array([0, 0, 4e3, 9e3, 7e3, 2e3, 0]))
-    >>> round(profile.exit_angle, 2), round(profile.peak_angle, 2), round(profile.entry_angle, 2)
-    (-0.1, 0.1, 0.4)
     """
 
     angle: Floats

@@ -15,7 +15,7 @@ from soilml.io.table import Table
 from soilml.physics.contact import stress
 from soilml.physics.effects import Effect, ShearSoftening, TrackGrousers
 from soilml.physics.gears import Track
-from soilml.physics.gears.track_belt import FRONT, MIDDLE, REAR, distance_along
+from soilml.physics.gears.track_belt import belt_arcs
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
@@ -99,13 +99,6 @@ def grouser_pull(
     along the belt, where the paper multiplies it by another cosine. Soil between grousers has no
     cohesion here, unlike in the effect `track-grousers`, which is the mean over all places with
     f_g = tan(phi).
-
-    Examples
-    --------
-    >>> from soilml import soil
-    >>> twelve = DiscreteGrousers(pitch=0.05, tip=0.01, friction=0.6, yielding=0.1)
-    >>> round(float(grouser_pull(WANG2018, soil("wang2018/clay"), 0.7, twelve).mean()), -1)
-    740.0
     """
     at = Operating(slip=np.asarray([slip]), load=np.asarray([robot.load]))
     model, track = Model(robot.track, effects), robot.track
@@ -161,23 +154,14 @@ def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -
     References
     ----------
     Wang et al. 2018, eqs. 3, 8 and 9, in which the tensions at the joints cancel.
-
-    Examples
-    --------
-    >>> from soilml import Model, Operating, soil
-    >>> at = Operating(slip=0.2, load=WANG2018.load)
-    >>> balance = track_balance(Model(WANG2018.track), soil("wang2018/sand"), at)
-    >>> [round(float(balance[f"{part}_share"]), 2) for part in ("front", "belt", "rear")]
-    [0.14, 0.8, 0.05]
     """
     track = track_of(model)
     belt = track.contact_geometry(model(soil, at).sinkage, soil, at)
     profile = model.profile(soil, at, points)
-    front_end, _ = distance_along(belt, FRONT, -belt.leave)
-    middle_end, _ = distance_along(belt, MIDDLE, belt.meet)
-    step = distance_along(belt, REAR, -belt.exit)[0] / (points - 1)
+    _, middle, last = belt_arcs(belt)
+    step = last.distance(-belt.exit)[0] / (points - 1)
     way = step * np.arange(points).reshape(-1, *[1] * np.ndim(step))
-    front, rear = way < front_end, way > middle_end
+    front, rear = way < middle.along, way > last.along
     weight = np.full_like(way, 1.0) * step
     weight[[0, -1]] *= 0.5
     lift = profile.normal * np.cos(profile.angle) + profile.shear * np.sin(profile.angle)

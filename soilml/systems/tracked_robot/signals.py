@@ -102,12 +102,6 @@ def slip_from_displacements(track: ArrayLike, robot: ArrayLike, span: int) -> Fl
 
     of the belt and of the robot. For driving only: `InputError` is raised if the belt does not move
     forward within a window. References: Wang et al. 2018, section 4.1.1.
-
-    Examples
-    --------
-    >>> belt = np.linspace(0.0, 2.0, 201)
-    >>> slip_from_displacements(belt, 0.7 * belt, span=100)[:2].round(3)
-    array([0.3, 0.3])
     """
     belt, ground = _check_signal(track, "track", span + 1), _check_signal(robot, "robot", span + 1)
     advance = belt[span:] - belt[:-span]

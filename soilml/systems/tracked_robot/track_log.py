@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -197,38 +196,3 @@ def evaluate_log(
         fit = identify(case, measured, method="nonlinear")
         case = case.with_values(dict(zip(fit.names, fit.values.tolist(), strict=True)))
     return TrackLog(rows, fit, case, grousers)
-
-
-def simulate_log(
-    case: Case, slips: Floats, load: float, spacing: float, rng: np.random.Generator
-) -> Mapping[str, list[Any]]:
-    """Columns of a log of pulls at slips, 20 Hz: the payload tightens, then the robot pulls on.
-
-    The tension has oscillations of 5 %, the lasers a millimetre of noise, and ruts of 4 mm.
-    """
-    at = Operating(slip=np.asarray(slips, float), load=load)
-    force = case.model(case.soil, at)
-    belt = track_of(case.model).contact_geometry(np.asarray(force.sinkage), case.soil, at)
-    columns: dict[str, list[Any]] = {name: [] for name in (*LOG, *LASERS)}
-    time = np.arange(0.0, 40.0, 0.05)
-    tight = np.clip((time - 4.0) / 4.0, 0.0, 1.0)
-    trims, rears = np.asarray(belt.trim), np.asarray(belt.rear)
-    for k, (slip, pull) in enumerate(zip(slips, np.asarray(force.drawbar_pull), strict=True)):
-        turned = 0.05 * np.maximum(time - 4.0, 0.0)
-        noise = rng.standard_normal((3, time.size))
-        swing = np.convolve(rng.standard_normal(time.size + 9), np.ones(10) / 10**0.5, "valid")
-        ruts = 0.002 * np.sign(np.sin(2.0 * np.pi * turned / 0.05))
-        rear = 0.2 + float(rears[k]) - spacing * np.sin(float(trims[k])) + ruts
-        values = (
-            [f"pull_{k + 1}"] * time.size,
-            time,
-            turned,
-            (1.0 - float(slip)) * turned + 2e-4 * noise[0],
-            2.0 * float(pull) * tight * (1.0 + 0.05 * swing) + 2.0 * noise[1],
-            0.2 + 1e-3 * noise[2],
-            rear + 1e-3 * noise[0],
-            np.full(time.size, float(trims[k])),
-        )
-        for name, value in zip(columns, values, strict=True):
-            columns[name] += list(value)
-    return columns

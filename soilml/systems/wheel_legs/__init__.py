@@ -6,7 +6,6 @@ means for a heavy rover, and `slip_of_strides` gives the slip on a known soil. S
 Saaj, IEEE Transactions on Robotics 33(6), 2017.
 """
 
-from soilml.systems.wheel_legs.gaits import gait_metrics
 from soilml.systems.wheel_legs.resistive_force import LinearGround, WheelLeg, wheel_leg
 from soilml.systems.wheel_legs.stances import SpringLeg, simulate_stance, vibration_amplitude
 from soilml.systems.wheel_legs.stride_relations import LegSoil, StrideRelation, soil_of_sinkage
@@ -17,7 +16,7 @@ from soilml.systems.wheel_legs.strides import (
     slip_of_strides,
     soil_of_strides,
 )
-from soilml.systems.wheel_legs.walk import Walk, WalkStatus, walk
+from soilml.systems.wheel_legs.walk import Walk, WalkStatus, gait_metrics, walk
 
 __all__ = [
     "LegSoil", "LinearGround", "Mobility", "SpringLeg", "StrideRelation", "StrideSoil",

@@ -46,12 +46,6 @@ def resistance_terms(c2: Array, s2: Array) -> tuple[Array, Array, Array, Array, 
     and alpha_x with C and D (Comin and Saaj 2017, eq. 5, with sines). Static part (x, z) and matrix
     R (xx, xz, zx, zz) at cos 2 beta and sin 2 beta, beta anticlockwise from the direction of travel
     x; v is the direction of motion, a unit vector with z upwards, so that no angle is wrapped.
-
-    Examples
-    --------
-    >>> _, rest, *_, zz = resistance_terms(1.0, 0.0)  # a flat plate pushed straight down
-    >>> round(rest + zz, 3)
-    1.0
     """
     return (
         -D[1, 0] * s2,
@@ -202,11 +196,6 @@ def wheel_leg(foot: str = "LTF", **changes: Any) -> WheelLeg:
     """The paper's wheel-leg with a foot of `FEET`, and other fields of `WheelLeg` replaced.
 
     Raises `InputError` for an unknown foot, and for an invalid wheel-leg.
-
-    Examples
-    --------
-    >>> wheel_leg("CIF", legs=3).plates().shape  # 10 + 13 + 7 segments of each leg, and the body
-    (5, 91)
     """
     if foot not in FEET:
         raise InputError(f"no foot {foot!r}; there are: {', '.join(FEET)}")

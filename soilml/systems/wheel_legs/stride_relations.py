@@ -72,9 +72,7 @@ class SlipLine:
 
     def line(self, friction_angle: Real, normal_stiffness: Real) -> tuple[Floats, Floats]:
         """Intercept and slope on a soil of this angle (rad) and stiffness (Pa)."""
-        a, b = (c + p * np.asarray(friction_angle) + q * np.asarray(normal_stiffness)
-                for c, p, q in self.of_soil)  # fmt: skip
-        return a, b
+        return affine(self.of_soil, friction_angle, normal_stiffness)
 
 
 @final
@@ -101,12 +99,6 @@ class StrideRelation(SlipLine):
 
         Raises `InputError` for pairs that are not valid, `FitError` if they do not determine the
         soil or the estimate is not physical.
-
-        Examples
-        --------
-        >>> found = TORQUE.soil(1.1, 0.25)
-        >>> [round(float(np.rad2deg(v))) for v in (found.mean[0], found.std[0])]  # degrees
-        [40, 6]
         """
         x, i = (np.atleast_1d(np.asarray(v, float)) for v in (reading, slip))
         _check_pairs(x, i)
@@ -159,17 +151,10 @@ SPRING_OF_SOIL = _inverse(SPRING)
 ASSUMED_SPRING = (1.434 - 0.882) / 0.789 * STIFFNESS
 
 
-def spring_soil(increment: Real, stiffness: Real) -> tuple[Floats, Floats]:
-    """(friction angle in rad, sigma_1 in Pa) from drop of friction (rad) and k_S (N/m), eq. 28."""
-    angle, sigma = (c + p * np.asarray(increment) + q * np.asarray(stiffness) for c, p, q in SPRING)
-    return angle, sigma
-
-
-def soil_spring(friction_angle: Real, normal_stiffness: Real) -> tuple[Floats, Floats]:
-    """(drop of friction in rad, k_S in N/m) of a soil: the exact inverse of `spring_soil`."""
-    drop, k = (c + p * np.asarray(friction_angle) + q * np.asarray(normal_stiffness)
-               for c, p, q in SPRING_OF_SOIL)  # fmt: skip
-    return drop, k
+def affine(rows: Floats, x: Real, y: Real) -> tuple[Floats, Floats]:
+    """Two numbers by c + p x + q y, of rows (c, p, q), such as `SPRING`, its inverse or a line."""
+    first, second = (c + p * np.asarray(x) + q * np.asarray(y) for c, p, q in rows)
+    return first, second
 
 
 def _of_spring(intercept: float, by_stiffness: float) -> Floats:

@@ -76,7 +76,7 @@ class RecipeFamily(WheelFamily):
             )
         elif len(names) > MOST_UNKNOWNS:
             said = f"{len(names)} unknowns; needed are {MOST_UNKNOWNS} or fewer"
-        elif recipe.slip.lower <= 0.0 or recipe.covariates or recipe.gear_sensors:
+        elif recipe.slip.lower <= 0.0 or recipe.covariates or recipe.stick_slip:
             said = (
                 "slip of 0 or less, covariates or stick-slip; needed are slip above 0 and torque "
                 "that depends on slip, load and soil alone; remove [set_posterior] from the spec"

@@ -8,12 +8,13 @@ from soilml.systems.wheel_legs.resistive_force import GROUNDS
 from soilml.systems.wheel_legs.stride_relations import (
     ASSUMED_SPRING,
     GRAVITY,
+    SPRING,
+    SPRING_OF_SOIL,
     TORQUE,
     TORQUE_SLIP,
     VIBRATION,
     VIBRATION_SLIP,
-    soil_spring,
-    spring_soil,
+    affine,
 )
 
 ANGLE, STIFFNESS = 0.7, 1.6e4
@@ -30,8 +31,8 @@ def test_the_relations_are_the_printed_ones():
     a, b = TORQUE_SLIP["empirical"].line(ANGLE, STIFFNESS)
     assert 1.0 - 0.58 * b == pytest.approx(ANGLE)
     assert -0.7 + 20.928 * b + 15.997 * a == pytest.approx(STIFFNESS / 1e4)
-    drop, spring = soil_spring(ANGLE, STIFFNESS)
-    assert spring_soil(drop, spring) == pytest.approx([ANGLE, STIFFNESS])
+    drop, spring = affine(SPRING_OF_SOIL, ANGLE, STIFFNESS)
+    assert affine(SPRING, drop, spring) == pytest.approx([ANGLE, STIFFNESS])
     degrees = np.rad2deg(drop)
     for name, intercept, by_spring in (("planar", -1.434, 0.789), ("linear", -0.882, 0.0)):
         a, b = VIBRATION_SLIP[name].line(ANGLE, STIFFNESS)
@@ -44,9 +45,9 @@ def test_the_relations_are_the_printed_ones():
 
 @pytest.mark.parametrize("relation", [TORQUE, VIBRATION], ids=["torque", "vibration"])
 def test_readings_on_the_line_of_a_soil_give_its_angle(relation):
-    drop = soil_spring(ANGLE, STIFFNESS)[0]
-    stiffness = STIFFNESS if relation is TORQUE else spring_soil(drop, ASSUMED_SPRING)[1]
-    angle = ANGLE if relation is TORQUE else spring_soil(drop, ASSUMED_SPRING)[0]
+    drop = affine(SPRING_OF_SOIL, ANGLE, STIFFNESS)[0]
+    stiffness = STIFFNESS if relation is TORQUE else affine(SPRING, drop, ASSUMED_SPRING)[1]
+    angle = ANGLE if relation is TORQUE else affine(SPRING, drop, ASSUMED_SPRING)[0]
     a, b = relation.line(angle, stiffness)
     assert relation.soil((SLIPS - a) / b, SLIPS).mean[0] == pytest.approx(float(angle))
 
@@ -54,7 +55,7 @@ def test_readings_on_the_line_of_a_soil_give_its_angle(relation):
 def test_in_the_units_used_the_four_soils_slip_as_tested_for_tenths_of_g():
     angle = np.asarray([ground.friction_angle for ground in GROUNDS.values()])
     sigma = np.asarray([ground.normal_stiffness for ground in GROUNDS.values()])
-    drop, spring = soil_spring(angle, sigma)
+    drop, spring = affine(SPRING_OF_SOIL, angle, sigma)
     assert ((np.rad2deg(drop) > 30) & (np.rad2deg(drop) < 42)).all()
     assert ((spring > 700) & (spring < 1000)).all()
     a, b = VIBRATION_SLIP["planar"].line(angle, sigma)
@@ -82,7 +83,7 @@ def test_intervals_cover_soils_whose_errors_are_of_the_size_of_table_viii(stride
         by_torque, by_vibration, by_sinkage = angle * (1.0 + shares)
         noise = rng.standard_normal((2, strides))
         drop = np.deg2rad((by_vibration + 0.76 - 0.35e-3 * ASSUMED_SPRING) / 0.03)
-        a, b = spring.line(*spring_soil(drop, ASSUMED_SPRING))
+        a, b = spring.line(*affine(SPRING, drop, ASSUMED_SPRING))
         readings = {
             "torque": (slip + shear.slip_std * noise[0] + 0.33) / ((by_torque - 1.0) / -0.58),
             "vibration": (slip + spring.slip_std * noise[1] - a) / b,
