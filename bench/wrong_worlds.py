@@ -102,7 +102,7 @@ UNLISTED = (
 def mechanisms() -> dict[str, Mechanism]:
     """Mechanisms of all tiers by their keys, and a shear stress that falls."""
     known = {key: mechanism for tier in MECHANISMS.values() for key, mechanism in tier.items()}
-    falls = replace(known["shear-softening"], shear=_falls_beyond_two_moduli)
+    falls = replace(known["shear-softening"], acts={"shear": _falls_beyond_two_moduli})
     return known | {"falls-beyond-two-moduli": falls}
 
 
