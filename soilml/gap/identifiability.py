@@ -180,7 +180,6 @@ def planned_readings(case: Case, design: Table) -> Readings:
         names,
         measured=np.concatenate([expected[column(n)] for n in names]),
         std=np.concatenate([stds[n] for n in names]),
-        noise=[case.noise.get(column(n)) for n in names],
         run=number.astype(np.int64),
         runs=[str(r) for r in runs],
     )

@@ -136,14 +136,13 @@ def _readings_like(at: Operating, case: Case, like: Readings, measured: Floats) 
     """Measured values (m,) of a run, with the noise of known readings, else that of the case."""
     stds = []
     for i, own in enumerate(np.split(measured, len(like.channels))):
-        noise = like.noise[i] or case.noise.get(column(like.channels[i]))
+        noise = case.noise.get(column(like.channels[i]))
         typical = np.full(own.shape, np.median(like.std[like.channel == i]))
         stds.append(np.maximum(typical if noise is None else noise.std(own), 1e-12))
     return replace(
         Readings.of_every_row(with_default_covariates(at, case), like.channels),
         measured=measured,
         std=np.concatenate(stds),
-        noise=like.noise,
         runs=("next",),
     )
 

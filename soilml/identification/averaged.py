@@ -81,9 +81,9 @@ def averaged_samples(
     optimum = fit_under_declared_noise(case, readings, free)
     misfit = Misfit.of(optimum, readings, len(free))
     if readings.undeclared:
-        std = np.where(np.isfinite(readings.std), readings.std, optimum.problem.readings.std)
-        known = readings.from_case & np.isfinite(readings.std)
-        readings = replace(readings, std=std, from_case=known)
+        std, unknown = optimum.problem.readings.std, ~np.isfinite(readings.std)
+        names = [readings.channels[i] for i in readings.channel[unknown]]
+        readings = readings.with_default_std(dict(zip(names, std[unknown], strict=True)))
     problem = InferenceProblem.of(case, readings, free, candidate_effects(case, EFFECTS))
     try:
         found = infer(problem)
