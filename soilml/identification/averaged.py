@@ -79,7 +79,7 @@ def averaged_samples(
 ) -> PosteriorSamples:
     """Weighted samples of the soil over all explanations of the rows; see `averaged`."""
     optimum = fit_under_declared_noise(case, readings, free)
-    misfit = Misfit.of(optimum, readings, len(free))
+    misfit = Misfit.of(optimum)
     if readings.undeclared:
         std, unknown = optimum.problem.readings.std, ~np.isfinite(readings.std)
         names = [readings.channels[i] for i in readings.channel[unknown]]

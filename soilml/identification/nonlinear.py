@@ -73,7 +73,7 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
         problem = replace(optimum.problem, priors="all")
         with_prior = descend(problem, optimum.x, EXACT, optimum.linearisation)
     x = optimum.x
-    found = Misfit.of(optimum, readings, len(free))
+    found = Misfit.of(optimum)
     excess = not undeclared and found.exceeds_noise
     of_prior = np.asarray([c.fraction_precision for c in free])
     of_tests = optimum.soil_tests.rates(x)
