@@ -18,7 +18,6 @@ from soilml.fitting.levels import Levels, load_levels, replicate_rows, slip_leve
 from soilml.fitting.operating_points import gear_numbers, operating_points, operating_points_of_rows
 from soilml.fitting.shared_errors import declared_errors
 from soilml.io.table import Table
-from soilml.physics.effects.base import REFERENCE_LOAD, log_relative_slip
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
@@ -123,14 +122,6 @@ class Readings:
         """Columns of the channels with a reading whose noise is not declared."""
         unknown = np.unique(self.channel[~np.isfinite(self.std)])
         return tuple(column(self.channels[i]) for i in unknown)
-
-    @property
-    def log_slip_and_load(self) -> tuple[Floats, Floats]:
-        """Logarithms of slip and load, each (m,), whose coefficients are the shapes of laws.
-
-        They are zero at the slip and load where the size of an effect is its parameter's value.
-        """
-        return log_relative_slip(self.slip), np.log(self.load / REFERENCE_LOAD)
 
     @cached_property
     def slip_levels(self) -> Levels:

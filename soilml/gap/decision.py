@@ -83,7 +83,10 @@ def decide(
     none, reasons = posterior.no_effect, tuple(obstacles)
     ranked = ranked_sets(posterior)
     chance = posterior.probability(*ranked[0]) if ranked else 0.0
-    if _is_other_soil(posterior) and none > max(constants.UNCERTAIN, chance):
+    alone = next((n for n in posterior.nodes if not n.hypothesis.effects), None)
+    # the soil alone is likeliest outside its priors, without a discrepancy
+    other_soil = alone and alone.hypothesis.wide_priors and alone.share_without > 0.5
+    if other_soil and none > max(constants.UNCERTAIN, chance):
         return Decision("undecided", reasons=(soil_outside_priors(posterior),))
     hopeless = 1.0 - constants.UNCERTAIN if obstacles else 0.0
     if not ranked or (none > constants.UNCERTAIN and none > max(chance, hopeless)):
@@ -112,12 +115,6 @@ def decide(
     if none <= constants.CHANCE and len(listed) > 1 and together >= constants.LIKELIER:
         return Decision("class", listed, listed, node)
     return replace(suspected, reasons=(NOT_DECISIVE,))
-
-
-def _is_other_soil(posterior: Posterior) -> bool:
-    """Whether the soil alone is likeliest outside its priors, without a discrepancy."""
-    alone = next((n for n in posterior.nodes if not n.hypothesis.effects), None)
-    return alone is not None and alone.hypothesis.wide_priors and alone.share_without > 0.5
 
 
 def pressed_priors(fit: Solution) -> dict[str, str]:
@@ -163,7 +160,13 @@ def _reason(code: str, names: Names) -> Remark:
 def _doubt(posterior: Posterior, node: Explanation, gain: float) -> Remark | None:
     """Why an explanation is not claimed, whatever its probability is."""
     names = node.hypothesis.effects
-    if faults := implausible_faults(node.fit):
+    deviation = np.abs(node.fit.x) * np.sqrt(node.fit.precision)
+    faults = tuple(
+        c.effect
+        for c, d in zip(node.fit.coordinates, deviation, strict=True)
+        if c.effect and not c.is_shape and d > constants.MAX_SIZE_DEVIATION
+    )
+    if faults:
         return _reason("implausible-fault", faults)
     if implausible_sizes(node.fit):
         return _reason("implausible-size", names)
@@ -186,16 +189,6 @@ def _unchecked_faults(posterior: Posterior, names: Names) -> tuple[str, ...]:
     problem = posterior.problem
     kinds = {name: problem.effects[name].about.kind for name in names}
     return tuple(n for n in names if kinds[n] in ("sensor", "rig") and n not in problem.calibration)
-
-
-def implausible_faults(fit: Solution) -> tuple[str, ...]:
-    """Faults of sensors and the rig that are far larger than their priors allow."""
-    deviation = np.abs(fit.x) * np.sqrt(fit.precision)
-    return tuple(
-        c.effect
-        for c, d in zip(fit.coordinates, deviation, strict=True)
-        if c.effect and not c.is_shape and d > constants.MAX_SIZE_DEVIATION
-    )
 
 
 def implausible_sizes(fit: Solution) -> dict[str, float]:

@@ -16,6 +16,7 @@ from soilml.inference.evidence import linear_model, of_priors
 from soilml.inference.explanation import Explanation, StartedFit
 from soilml.inference.gaussian_terms import Hyperparameters
 from soilml.inference.problem import SOIL_ALONE, Hypothesis
+from soilml.physics.effects.base import REFERENCE_LOAD, log_relative_slip
 
 if TYPE_CHECKING:
     from soilml.inference.search import Search
@@ -57,8 +58,10 @@ def _moves(
     The third entry of a move is the sign that the size of its effect must have, or 0.
     """
     h, fit, problem = node.hypothesis, node.fit, search.problem
-    s, w = problem.readings.log_slip_and_load
-    terms = {"slip_power": s, "by_slip": problem.readings.slip, "by_load": w}
+    slip, load = problem.readings.slip, problem.readings.load
+    # zero where the size of an effect is its parameter's value
+    terms = {"slip_power": log_relative_slip(slip), "by_slip": slip}
+    terms["by_load"] = np.log(load / REFERENCE_LOAD)
     extra: list[tuple[Coordinate, Floats]] = []
     moves: list[tuple[Hypothesis, list[int], int]] = []
     p = len(fit.x)

@@ -305,7 +305,7 @@ class LinearisedFit:
         b = products[own, -1] - self.pull[own]
         free, step = ~held, np.zeros(len(own))
         step[free] = np.linalg.solve(curvature[np.ix_(free, free)], b[free])
-        covariance = np.linalg.inv(curvature)
+        variance = np.diag(np.linalg.inv(curvature))[first:]
         push = np.where(free, 0.0, b - curvature @ step)
         value = float(
             products[-1, -1]
@@ -316,17 +316,20 @@ class LinearisedFit:
             + self.cost
             + self.constant[own].sum()
         )
-        coordinates = [self.coordinates[i] for i in own]
-        for i in range(first, len(own)):
-            value += correction_of_prior(
-                coordinates[i],
-                float(self.x[own[i]]),
-                float(1.0 / covariance[i, i]),
-                float(step[i]),
-                float(push[i]),
-                held=bool(held[i]),
-            )
+        value += self.corrections(own[first:], variance, step[first:], push[first:])
         return value, step
+
+    def corrections(
+        self, numbers: Sequence[int], variance: Floats, step: Floats, push: Floats
+    ) -> float:
+        """-2 ln of the factors by which exact priors of some coordinates change the evidence."""
+        each = zip(numbers, variance.tolist(), step.tolist(), push.tolist(), strict=True)
+        return sum(
+            correction_of_prior(
+                self.coordinates[i], float(self.x[i]), 1.0 / v, s, p, held=bool(self.held[i])
+            )
+            for i, v, s, p in each
+        )
 
 
 def linear_model(
@@ -375,15 +378,5 @@ def linear_model(
 
 def of_priors(model: LinearisedFit, found: Evaluation) -> float:
     """-2 ln of the factors by which exact priors along each axis differ from their stand-ins."""
-    diagonal = np.diag(found.covariance)
-    return sum(
-        correction_of_prior(
-            c,
-            float(model.x[i]),
-            float(1.0 / diagonal[i]),
-            float(found.step[i]),
-            float(found.push[i]),
-            held=bool(model.held[i]),
-        )
-        for i, c in enumerate(model.coordinates)
-    )
+    variance = np.diag(found.covariance)
+    return model.corrections(range(len(variance)), variance, found.step, found.push)

@@ -189,7 +189,11 @@ class Posterior:
         node = self.search.nodes.get(hypothesis)
         several = len(self.terms.readings.channels) > 1
         one_channel = several and all(name in self.only_channel for name in names)
-        return node is None or one_channel or shape_deviation(node) > constants.FAR_LAW
+        if node is None or one_channel:
+            return True
+        fit, shapes = node.fit, [i for i, c in enumerate(node.fit.coordinates) if c.is_shape]
+        # squared distance of the shapes from the catalogue's laws, in prior variances
+        return float(np.sum(fit.x[shapes] ** 2 * fit.precision[shapes])) > constants.FAR_LAW
 
     def node_weight(self, node: Explanation) -> float:
         """Probability of a fitted hypothesis."""
@@ -301,12 +305,7 @@ class Posterior:
         proposed = [
             own for one in self.components() for own in proposals(one, self.terms, count, rng)
         ]
-        found = []
-        for own in proposed:
-            fit = own.node.fit
-            near = replace(fit.linearisation.sinkage_at(own.x), nearest=True)
-            found.append(weighted(own, self.terms, fit.problem.predict(own.x, near)))
-        return found
+        return [weighted(*own, self.terms) for own in proposed]
 
     def beside(self, fixed: Floats, inner: Sequence[Floats] = ()) -> Posterior:
         """The same hypotheses beside further Gaussian terms; see `Search.beside`."""
@@ -330,10 +329,3 @@ class Posterior:
                 np.concatenate(values), np.concatenate(weights), c.unit, factor
             )
         return found
-
-
-def shape_deviation(node: Explanation) -> float:
-    """Squared distance of the shapes from the catalogue's laws, in prior variances."""
-    fit = node.fit
-    shapes = [i for i, c in enumerate(fit.coordinates) if c.is_shape]
-    return float(np.sum(fit.x[shapes] ** 2 * fit.precision[shapes]))
