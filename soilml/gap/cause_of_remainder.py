@@ -9,7 +9,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.fitting.coordinates import Coordinate
-from soilml.gap.held_out import held_out_folds
+from soilml.gap.held_out import held_out_folds, log_score
 from soilml.gap.results import RemainderCause
 from soilml.gap.stage_changes import OPERATING, stage_changes
 from soilml.inference.constants import IN_CATALOGUE
@@ -127,17 +127,10 @@ def _predictive_gain(
 ) -> float:
     """Log density of rows kept back with the change, above that without; nil without such rows."""
     parts, at = held_out_folds(posterior.terms.readings, seed).values(), best.at
-    assert at is not None
+    if not parts or at is None:
+        return 0.0
     changed = _beside_changes(posterior, node, best.columns, best.amplitude)
-    sums = [
-        sum(
-            changed.log_density(at, folds.fold == k)
-            - node.linear.log_density(node.at, folds.fold == k)
-            for k in folds.predicted
-        )
-        for folds in parts
-    ]
-    return float(np.mean(sums)) if sums else 0.0
+    return log_score(changed, at, parts) - log_score(node.linear, node.at, parts)
 
 
 def _beside_changes(

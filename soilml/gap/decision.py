@@ -103,7 +103,11 @@ def decide(
     if none > constants.UNCERTAIN:
         return replace(suspected, reasons=(NOT_DECISIVE,))
     if chance >= constants.NAMED_PROBABILITY:
-        if unchecked := _unchecked_faults(posterior, best):
+        # an offset of one channel imitates what no catalogue has, such as a crust on the soil: a
+        # check of the sensor shows a fault, rows alone do not
+        problem = posterior.problem
+        faults = (n for n in best if problem.effects[n].about.kind in ("sensor", "rig"))
+        if unchecked := tuple(n for n in faults if n not in problem.calibration):
             return replace(suspected, reasons=(_reason("unchecked-fault", unchecked),))
         status = "named"
         if node.share_without < constants.LIKELIER:
@@ -135,22 +139,19 @@ def opened_priors(posterior: Posterior) -> tuple[Remark, ...]:
         return ()
     if not best.effects:
         return (soil_outside_priors(posterior),)
-    pressed, why = _within_priors(posterior)
-    return (Remark("prior-opened", f"the priors of the soil were opened: {why}", pressed),)
+    opened = "prior-opened", "the priors of the soil were opened"
+    return (soil_outside_priors(posterior, *opened),)
 
 
-def soil_outside_priors(posterior: Posterior) -> Remark:
-    """That the soil alone explains the rows where its priors are opened."""
-    pressed, why = _within_priors(posterior)
-    text = f"a soil outside its priors explains the rows: {why}"
-    return Remark("soil-outside-priors", text, pressed)
-
-
-def _within_priors(posterior: Posterior) -> tuple[tuple[str, ...], str]:
-    """The soil parameters at ends of their priors, and what a fit within these is like."""
+def soil_outside_priors(
+    posterior: Posterior,
+    code: str = "soil-outside-priors",
+    text: str = "a soil outside its priors explains the rows",
+) -> Remark:
+    """That the rows are explained where the soil's priors are opened, and what is within them."""
     pressed = pressed_priors(posterior.soil.fit)
     why = f"within them, the fit has {'; '.join(pressed.values()) or 'a large remainder'}"
-    return tuple(pressed), why
+    return Remark(code, f"{text}: {why}", tuple(pressed))
 
 
 def _reason(code: str, names: Names) -> Remark:
@@ -178,17 +179,6 @@ def _doubt(posterior: Posterior, node: Explanation, gain: float) -> Remark | Non
     if posterior.by_other_law(node.hypothesis):
         return _reason("other-law", names)
     return None
-
-
-def _unchecked_faults(posterior: Posterior, names: Names) -> tuple[str, ...]:
-    """The faults of sensors and rig among effects, of which no check says how large they can be.
-
-    An offset of one channel imitates what no catalogue has, such as a crust on the soil: rows alone
-    do not show a fault, a check of the sensor does.
-    """
-    problem = posterior.problem
-    kinds = {name: problem.effects[name].about.kind for name in names}
-    return tuple(n for n in names if kinds[n] in ("sensor", "rig") and n not in problem.calibration)
 
 
 def implausible_sizes(fit: Solution) -> dict[str, float]:

@@ -92,23 +92,18 @@ def whole_answer(posterior: Posterior, decision: Decision) -> Explanation | None
     return None
 
 
-def weighed_explanations(posterior: Posterior) -> list[tuple[float, Explanation]]:
-    """The likeliest explanations that together hold `constants.HELD`, with their probabilities."""
-    found: list[tuple[float, Explanation]] = []
-    for node in posterior.nodes[: constants.MOST_RETURNED]:
-        found.append((posterior.node_weight(node), node))
-        if sum(weight for weight, _ in found) >= constants.HELD:
-            break
-    return found
-
-
 def returned_case(posterior: Posterior, whole: Explanation | None, seed: int) -> Case:
     """What predicts: the case of the whole answer, else the mixture of all that is likely.
 
-    Of a mixture, the case itself has the mean soil and no effect; each explanation has its own.
-    The smooth remainder is that of the mixture.
+    The mixture is of the likeliest explanations that together hold `constants.HELD`. The case
+    itself has the mean soil and no effect; each explanation has its own. The smooth remainder is
+    that of the mixture.
     """
-    parts = [(1.0, whole)] if whole is not None else weighed_explanations(posterior)
+    parts = [] if whole is None else [(1.0, whole)]
+    for node in () if parts else posterior.nodes[: constants.MOST_RETURNED]:
+        parts.append((posterior.node_weight(node), node))
+        if sum(weight for weight, _ in parts) >= constants.HELD:
+            break
     left, learned = discrepancy_amplitudes(posterior, parts), learned_remainder(posterior, parts)
     if whole is not None:
         return updated_case(whole, left, learned)

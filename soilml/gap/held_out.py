@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +16,9 @@ from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.gap.results import BeforeAfter, GapReduction
+from soilml.inference.evidence import LinearisedFit
 from soilml.inference.explanation import Explanation
-from soilml.inference.gaussian_terms import scatter_columns, terms_like
+from soilml.inference.gaussian_terms import Hyperparameters, scatter_columns, terms_like
 from soilml.inference.posterior import Names, Posterior
 from soilml.inference.search import SOIL_STARTS
 from soilml.io.table import Table
@@ -167,18 +168,17 @@ def predictive_gains(posterior: Posterior, sets: Sequence[Names], seed: int) -> 
     parts = held_out_folds(posterior.terms.readings, seed)
     counted = [folds for part, folds in parts.items() if part != REGION or SLIPS not in parts]
 
-    def density(node: Explanation) -> float:
-        sums = [
-            sum(node.linear.log_density(node.at, folds.fold == k) for k in folds.predicted)
-            for folds in counted
-        ]
-        return float(np.mean(sums))
-
     known = {names: node for names in sets if (node := posterior.node_of(names)) is not None}
     if not counted or not known:
         return {}
-    alone = density(posterior.soil)
-    return {names: density(node) - alone for names, node in known.items()}
+    alone = log_score(posterior.soil.linear, posterior.soil.at, counted)
+    return {n: log_score(node.linear, node.at, counted) - alone for n, node in known.items()}
+
+
+def log_score(model: LinearisedFit, at: Hyperparameters, parts: Iterable[Folds]) -> float:
+    """Log density of rows kept back beside a remainder: mean over the parts."""
+    sums = [sum(model.log_density(at, own.fold == k) for k in own.predicted) for own in parts]
+    return float(np.mean(sums))
 
 
 def gap_reduction(

@@ -160,15 +160,6 @@ class InferenceProblem:
             value -= 2.0 * float(np.log(other if hypothesis.free_law else 1.0 - other))
         return value
 
-    def effects_beside(self, names: Sequence[str]) -> dict[str, type[Effect]]:
-        """The effects that may act beside others: of none of their families."""
-        present = [self.effects[name] for name in names]
-        return {
-            name: effect
-            for name, effect in self.effects.items()
-            if not any(exclude_each_other(effect, other) for other in present)
-        }
-
 
 def _as_fields(value: Any) -> Any:
     """A value by its type and fields, whose text tells any two apart."""
