@@ -47,7 +47,7 @@ def problem_under_noise(
         residual = optimum.problem.residual(optimum.prediction)
         otherwise = _residual_noise(readings, residual, len(free))
     std = np.where(np.isfinite(weighted.std), weighted.std, otherwise)
-    whiten = Whitening.of(std, columns_of_errors(soil, readings))
+    whiten = Whitening.beside(1.0 / std, columns_of_errors(soil, readings))
     return LeastSquaresProblem(case, free, replace(weighted, std=std), whiten, "normal")
 
 

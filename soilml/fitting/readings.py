@@ -107,10 +107,10 @@ class Readings:
         """Load of each reading, (m,), N."""
         return np.asarray(self.row_load[self.row])
 
-    @property
-    def gear(self) -> Integers:
-        """Number of the gear that drove each reading, (m,); 0 where none is named."""
-        return gear_numbers(self.at)[self.row]
+    def driven_by(self, unnamed: str) -> NDArray[np.str_]:
+        """Name of the gear that drove each reading, (m,); `unnamed` where the rows name none."""
+        gear = np.asarray(unnamed if self.at.gear is None else self.at.gear)
+        return np.asarray(np.broadcast_to(gear, len(self.run))[self.row])
 
     @property
     def row_count(self) -> int:

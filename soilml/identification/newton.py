@@ -78,7 +78,7 @@ def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     std = np.where(np.isfinite(declared), declared, ASSUMED_NOISE * np.abs(measured) + 1e-9)
 
     start = np.asarray([f.prior.fraction(f.nominal) for f in unknowns])
-    whiten = Whitening.of(std, np.zeros((len(std), 0)))
+    whiten = Whitening.beside(1.0 / std, np.zeros((len(std), 0)))
     found = descend(LeastSquaresProblem(case, unknowns, readings, whiten), start, EXACT)
     u = found.x
     if not np.isfinite(found.prediction).all():

@@ -199,11 +199,7 @@ class GaussianTerms:
         variance = self.variance(at)[self.without_scatter]
         used = variance > 0.0
         columns = self.columns[:, self.without_scatter[used]] * np.sqrt(variance[used])
-        white = Whitening(noise, columns[:, :0], np.zeros(0)) @ columns
-        if not white.shape[1]:
-            return Whitening(noise, white, np.zeros(0))
-        basis, size, _ = np.linalg.svd(white, full_matrices=False)
-        return Whitening(noise, basis, 1.0 - 1.0 / np.sqrt(1.0 + size**2))
+        return Whitening.beside(noise, columns)
 
     def noise_std(self, at: Hyperparameters) -> Floats:
         """Standard deviation (m,) of the noise."""

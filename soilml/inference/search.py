@@ -21,7 +21,6 @@ from soilml.fitting.covariance import noise_of_operation
 from soilml.fitting.damped_descents import COARSE, FINE, Tolerance, descend
 from soilml.fitting.effect_signatures import Signature, current_size
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
-from soilml.fitting.predictions import Linearisation
 from soilml.inference import constants
 from soilml.inference.additions import additions
 from soilml.inference.conditional import leave_one_out
@@ -200,7 +199,7 @@ class Search:
     def fit(
         self, jobs: Sequence[StartedFit], tolerance: Tolerance = COARSE
     ) -> list[Solution | InputError]:
-        """The fit of each job; the error of one that the model refuses."""
+        """The fit of each job; the error of one that the model refuses twice."""
         found = []
         for job in jobs:
             coordinates = self.problem.coordinates(job.hypothesis)
@@ -209,10 +208,15 @@ class Search:
             own = LeastSquaresProblem(case, coordinates, self.problem.readings, whiten)
             first = [job.start.get(c.path, self._first_size(c)) for c in coordinates]
             zero = [0.0 if c.of_candidate else job.start.get(c.path, 0.5) for c in coordinates]
-            known = job.near
-            if known is not None and len(known.x) != len(coordinates):
-                known = None
-            found.append(_careful(own, np.asarray(first), np.asarray(zero), known, tolerance))
+            known = job.near if job.near and len(job.near.x) == len(coordinates) else None
+            answer: Solution | InputError
+            for start, near in ((first, known), (zero, None)):  # again from effects at zero
+                try:
+                    answer = descend(own, np.asarray(start), tolerance, near)
+                    break
+                except InputError as error:
+                    answer = error
+            found.append(answer)
         return found
 
     def _first_size(self, coordinate: Coordinate) -> float:
@@ -352,24 +356,6 @@ class Search:
 def _by_value(predicted: StartedFit) -> tuple[float, Hypothesis]:
     """What predictions are ordered by: their values, then their hypotheses."""
     return predicted.value, predicted.hypothesis
-
-
-def _careful(
-    problem: LeastSquaresProblem,
-    first: Floats,
-    zero: Floats,
-    near: Linearisation | None,
-    tolerance: Tolerance,
-) -> Solution | InputError:
-    """One fit; where the model refuses its trials, again from effects at zero."""
-    try:
-        return descend(problem, first, tolerance, near)
-    except InputError:
-        pass
-    try:
-        return descend(problem, zero, tolerance)
-    except InputError as error:
-        return error
 
 
 def _distance(terms: GaussianTerms, a: Hyperparameters, b: Hyperparameters) -> float:
