@@ -124,7 +124,7 @@ def _step(at: Solution, damping: float) -> tuple[float, float, Floats]:
     A promise is the decrease of the linearised objective, up to the bounds.
     """
     problem, x = at.problem, at.x
-    deviation, rates = problem.terms.deviation(x), problem.terms.rates(x)
+    deviation, rates = problem.deviation(x), problem.rates(x)
     descent = at.residual @ at.jacobian - deviation @ rates
     normal, scale = _curvature(at)
     ends = problem.lower - x, problem.upper - x
@@ -155,7 +155,7 @@ def _corrected(last: Solution, new: Solution, damping: float) -> Floats:
 
 def _curvature(at: Solution) -> tuple[Floats, Floats]:
     """Half the curvature (p, p) of the linearised objective, and what damping adds to it."""
-    rates = at.problem.terms.rates(at.x)
+    rates = at.problem.rates(at.x)
     normal = at.jacobian.T @ at.jacobian + rates.T @ rates
     return normal, np.diag(np.diag(normal) + LEAST_SCALE)
 

@@ -108,7 +108,7 @@ def returned_case(posterior: Posterior, whole: Explanation | None, seed: int) ->
     if whole is not None:
         return updated_case(whole, left, learned)
     alone = updated_case(posterior.soil, left, learned)
-    mean = {p: round_significant(m.mean) for p, m in posterior.soil_marginals(seed).items()}
+    mean = {p: round_significant(m.value) for p, m in posterior.soil_marginals(seed).items()}
     each = tuple(CaseExplanation.of(round(w, 4), updated_case(node)) for w, node in parts)
     prior = dict(posterior.problem.case.prior)
     return replace(alone, prior=prior, explanations=each).with_values(mean)
@@ -123,10 +123,7 @@ def soil_before(fit: Solution) -> dict[str, EstimatedValue]:
 def soil_after(posterior: Posterior, seed: int) -> dict[str, EstimatedValue]:
     """The soil by all explanations together, by name: marginals of the posterior."""
     found = posterior.soil_marginals(seed, INTERVAL_FACTOR)
-    return {
-        path.rpartition(".")[2]: EstimatedValue(own.mean, own.std, own.unit)
-        for path, own in found.items()
-    }
+    return {path.rpartition(".")[2]: own for path, own in found.items()}
 
 
 def variance_component_entries(posterior: Posterior) -> dict[str, float]:

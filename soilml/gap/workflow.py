@@ -254,7 +254,7 @@ def _build_report(
         gap=figures,
         soil_before=soil_before(alone),
         soil_after=soil_after(posterior, seed),
-        untestable=dict(posterior.untestable),
+        untestable=dict(posterior.search.untestable),
         notes=(
             *notes,
             *not_reduced,

@@ -11,6 +11,7 @@ from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import GaussianTerms, Hyperparameters
 from soilml.inference.priors import log_density_of_size
 from soilml.quantities import Z_90
+from soilml.results import EstimatedValue
 
 #: Draws of a posterior, hyperparameters that are drawn of a component at most, draws of each at
 #: least, and proposals of each draw.
@@ -42,21 +43,6 @@ class Draws:
     x: Floats
     weight: Floats
     residual: Floats
-
-
-@dataclass(frozen=True)
-class Marginal:
-    """A parameter's marginal: its mean, and ends of its central 90 % interval."""
-
-    mean: float
-    low: float
-    high: float
-    unit: str
-
-    @property
-    def std(self) -> float:
-        """Standard deviation of the normal distribution with an interval as wide."""
-        return (self.high - self.low) / (2.0 * Z_90)
 
 
 #: A component at hyperparameters that were drawn, coordinates (k, p), and ln of their density (k,).
@@ -136,13 +122,13 @@ def weighted(own: Component, x: Floats, log_density: Floats, terms: GaussianTerm
     return Draws(own.node, own.at, x, own.weight * weight, residual)
 
 
-def marginal(values: Floats, weights: Floats, unit: str, factor: float) -> Marginal:
-    """Mean and central 90 % interval of weighted values (k,)."""
+def marginal(values: Floats, weights: Floats, unit: str, factor: float) -> EstimatedValue:
+    """Mean of weighted values (k,), and the standard deviation of a normal distribution whose
+    central 90 % interval is `factor` times as wide as theirs.
+    """
     order = np.argsort(values)
     share = weights[order] / weights.sum()
     middle = np.cumsum(share) - 0.5 * share
-    low, high = np.interp([0.05, 0.95], middle, values[order])
+    low, high = np.interp([0.05, 0.95], middle, values[order]).tolist()
     mean = float(weights @ values / weights.sum())
-    return Marginal(
-        mean, mean + factor * (float(low) - mean), mean + factor * (float(high) - mean), unit
-    )
+    return EstimatedValue(mean, factor * (high - low) / (2.0 * Z_90), unit)

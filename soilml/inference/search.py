@@ -63,6 +63,7 @@ class Search:
     progress: Callable[[float], None] = lambda _: None
     nodes: dict[Hypothesis, Explanation] = field(default_factory=dict)
     predicted: dict[Hypothesis, StartedFit] = field(default_factory=dict)
+    #: Why the rows cannot test some effects, by name, and signatures of others beside effects
     untestable: dict[str, Remark] = field(default_factory=dict)
     signatures: dict[tuple[str, ...], list[Signature]] = field(default_factory=dict)
     _tried: set[Hypothesis] = field(default_factory=set)
@@ -168,12 +169,11 @@ class Search:
                 break
         self._settle(jobs, float("inf"), constants.NEAR_AT_FIRST)
 
-    def beside(self, fixed: Floats, inner: Sequence[Floats], least: float) -> Search:
-        """The hypotheses above a probability, fitted beside further Gaussian terms.
+    def beside(self, fixed: Floats, inner: Sequence[Floats]) -> Search:
+        """The hypotheses that are drawn from, fitted beside further Gaussian terms.
 
         fixed (m, k): Columns of unit variance.
         inner: Columns (m, q) of discrepancies, each of which has an amplitude of its own.
-        least: Probability below which a hypothesis is left out.
         """
         known, first = self.terms, self.terms.channels
         terms = gaussian_terms(
@@ -185,7 +185,7 @@ class Search:
         def at(own: Hyperparameters) -> Hyperparameters:
             return replace(own, log=np.insert(own.log, first, np.full(len(inner), FIRST_AMPLITUDE)))
 
-        worst = self.lowest - 2.0 * float(np.log(least))
+        worst = self.lowest - 2.0 * float(np.log(constants.LEAST_DRAWN))
         jobs = [
             StartedFit(h, n.fit.start_values(), at(n.at), n.outliers, n.fit.linearisation)
             for h, n in self.nodes.items()
