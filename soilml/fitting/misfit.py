@@ -44,8 +44,13 @@ def problem_under_noise(
     else:
         soil, weighted = optimum.fitted(), readings.with_noise_at(optimum.prediction)
         weighted = weighted.with_noise_of_operation(noise_of_operation(soil, readings))
-        residual = optimum.problem.residual(optimum.prediction)
-        otherwise = _residual_noise(readings, residual, len(free))
+        # noise of each channel from its residuals, the parameters shared among all readings
+        square = optimum.problem.residual(optimum.prediction) ** 2
+        size = np.bincount(readings.channel)[readings.channel]
+        freedom = np.maximum(size * (1.0 - len(free) / len(readings)), 1.0)
+        scatter = np.sqrt(_mean_by_channel(readings, square) * size / freedom)
+        least = 1e-6 * np.sqrt(_mean_by_channel(readings, readings.measured**2)) + 1e-15
+        otherwise = np.maximum(scatter, least)
     std = np.where(np.isfinite(weighted.std), weighted.std, otherwise)
     whiten = Whitening.beside(1.0 / std, columns_of_errors(soil, readings))
     return LeastSquaresProblem(case, free, replace(weighted, std=std), whiten, "normal")
@@ -59,15 +64,6 @@ def columns_of_errors(case: Case, readings: Readings) -> Floats:
         return columns
     shared = stacked(error_columns(case, readings, readings.shared_errors), len(readings))
     return np.hstack([columns, shared])
-
-
-def _residual_noise(readings: Readings, residual: Floats, p: int) -> Floats:
-    """Noise of each channel (m,) from its residuals, p parameters shared among all readings."""
-    size = np.bincount(readings.channel)[readings.channel]
-    freedom = np.maximum(size * (1.0 - p / len(readings)), 1.0)
-    scatter = np.sqrt(_mean_by_channel(readings, residual**2) * size / freedom)
-    least = 1e-6 * np.sqrt(_mean_by_channel(readings, readings.measured**2)) + 1e-15
-    return np.asarray(np.maximum(scatter, least))
 
 
 def _mean_by_channel(readings: Readings, values: Floats) -> Floats:

@@ -160,10 +160,8 @@ def _prior_differences(estimator: Estimator, case: Case) -> list[Remark]:
     for i, name in enumerate(estimator.names):
         own, low, high = case.prior.get(name), estimator.prior.lower[i], estimator.prior.upper[i]
         uniform = own is not None and not own.log and own.normal_std is None
-        if own is not None and uniform:
-            off = max(abs(own.lower - low), abs(own.upper - high))
-            uniform = off <= SAME_PRIOR * (high - low)
-        if name not in used and not uniform:
+        off = max(abs(own.lower - low), abs(own.upper - high)) if own is not None else np.inf
+        if name not in used and not (uniform and off <= SAME_PRIOR * (high - low)):
             text = f"{name}: the file's prior is uniform from {low:.4g} to {high:.4g} "
             text += f"{declared(Soil)[name].unit}; that of the model is ignored"
             remarks.append(Remark("prior-ignored", text, (name,)))
