@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,19 +48,14 @@ APART = Tolerance(enough=1e-4, share=1e-5, iterations=50, creeping=0.0)
 COARSE = Tolerance(enough=0.5, share=0.01, iterations=3, creeping=1.0)
 
 
-def descend_each(
-    problems: Sequence[LeastSquaresProblem],
-    starts: Sequence[Floats],
-    known: Sequence[Linearisation | None],
-) -> list[Solution | InputError]:
-    """Descents of problems from starts (p,); the error of one whose trials the model refuses."""
-    found: list[Solution | InputError] = []
-    for problem, start, near in zip(problems, starts, known, strict=True):
-        try:
-            found.append(descend(problem, start, near=near))
-        except InputError as error:
-            found.append(error)
-    return found
+def descent_if_any(
+    problem: LeastSquaresProblem, start: Floats, near: Linearisation | None = None
+) -> Solution | None:
+    """The descent from a start (p,); None where the model refuses its trials."""
+    try:
+        return descend(problem, start, near=near)
+    except InputError:
+        return None
 
 
 def descend(
