@@ -120,12 +120,6 @@ def soil_before(fit: Solution) -> dict[str, EstimatedValue]:
     return {c.name: EstimatedValue(values[c.path], stds[c.path], c.unit) for c in fit.coordinates}
 
 
-def soil_after(posterior: Posterior, seed: int) -> dict[str, EstimatedValue]:
-    """The soil by all explanations together, by name: marginals of the posterior."""
-    found = posterior.soil_marginals(seed, INTERVAL_FACTOR)
-    return {path.rpartition(".")[2]: own for path, own in found.items()}
-
-
 def variance_component_entries(posterior: Posterior) -> dict[str, float]:
     """Noise scales, scatter and autocorrelation of the likeliest hypothesis, by their names."""
     terms, at = posterior.terms, posterior.noise

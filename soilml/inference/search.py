@@ -98,7 +98,7 @@ class Search:
         starts = [{c.path: c.prior.fraction(c.nominal) for c in problem.soil}]
         starts += [dict.fromkeys((c.path for c in problem.soil), x) for x in SOIL_STARTS]
         jobs = [StartedFit(SOIL_ALONE, start, self.terms.first(), none) for start in starts]
-        answers = self.fit(jobs, COARSE)
+        answers = [self.fit(job) for job in jobs]
         fits = [fit for fit in answers if not isinstance(fit, InputError)]
         if not fits:
             raise next(error for error in answers if isinstance(error, InputError))
@@ -150,7 +150,7 @@ class Search:
         is not needed. They are predicted from the soil alone under noise and scatter.
         """
         at, linear = soil.without.at, plain.linearisation
-        (fit,) = self.fit([StartedFit(SOIL_ALONE, plain.start_values(), at, soil.outliers, linear)])
+        fit = self.fit(StartedFit(SOIL_ALONE, plain.start_values(), at, soil.outliers, linear))
         if isinstance(fit, InputError):
             return
         model = linear_model(self.terms, fit, soil.outliers)
@@ -196,28 +196,21 @@ class Search:
 
     # ---- fits
 
-    def fit(
-        self, jobs: Sequence[StartedFit], tolerance: Tolerance = COARSE
-    ) -> list[Solution | InputError]:
-        """The fit of each job; the error of one that the model refuses twice."""
-        found = []
-        for job in jobs:
-            coordinates = self.problem.coordinates(job.hypothesis)
-            whiten = self.terms.whiten(job.at, job.outliers)
-            case = self.problem.case_of(job.hypothesis)
-            own = LeastSquaresProblem(case, coordinates, self.problem.readings, whiten)
-            first = [job.start.get(c.path, self._first_size(c)) for c in coordinates]
-            zero = [0.0 if c.of_candidate else job.start.get(c.path, 0.5) for c in coordinates]
-            known = job.near if job.near and len(job.near.x) == len(coordinates) else None
-            answer: Solution | InputError
-            for start, near in ((first, known), (zero, None)):  # again from effects at zero
-                try:
-                    answer = descend(own, np.asarray(start), tolerance, near)
-                    break
-                except InputError as error:
-                    answer = error
-            found.append(answer)
-        return found
+    def fit(self, job: StartedFit, tolerance: Tolerance = COARSE) -> Solution | InputError:
+        """The fit of a job; the error where the model refuses it twice."""
+        coordinates = self.problem.coordinates(job.hypothesis)
+        whiten, case = self.terms.whiten(job.at, job.outliers), self.problem.case_of(job.hypothesis)
+        own = LeastSquaresProblem(case, coordinates, self.problem.readings, whiten)
+        first = [job.start.get(c.path, self._first_size(c)) for c in coordinates]
+        zero = [0.0 if c.of_candidate else job.start.get(c.path, 0.5) for c in coordinates]
+        known = job.near if job.near and len(job.near.x) == len(coordinates) else None
+        answer: Solution | InputError
+        for start, near in ((first, known), (zero, None)):  # again from effects at zero
+            try:
+                return descend(own, np.asarray(start), tolerance, near)
+            except InputError as error:
+                answer = error
+        return answer
 
     def _first_size(self, coordinate: Coordinate) -> float:
         """The case's own value of an effect's size, else a size off zero; shapes start at zero."""
@@ -266,8 +259,8 @@ class Search:
         found: dict[Hypothesis, Explanation] = {}
         for turn in range(constants.FITS_IN_TURN):
             again = []
-            fits = self.fit(jobs, COARSE if turn == 0 else FINE)
-            for job, fit in zip(jobs, fits, strict=True):
+            for job in jobs:
+                fit = self.fit(job, COARSE if turn == 0 else FINE)
                 if isinstance(fit, InputError) or not np.isfinite(fit.prediction).all():
                     continue
                 try:

@@ -66,7 +66,7 @@ def test_every_counted_hypothesis_is_an_optimum_under_its_own_hyperparameters(n1
             for _ in range(3)
         ]  # fmt: skip
         jobs = [StartedFit(node.hypothesis, start, node.at, node.outliers) for start in starts]
-        for fit in own.search.fit(jobs):
+        for fit in map(own.search.fit, jobs):
             again = own.search.node(node.hypothesis, fit, node.at, node.outliers)
             assert again.value > node.value - 1.5
 
