@@ -323,13 +323,11 @@ class LinearisedFit:
         self, numbers: Sequence[int], variance: Floats, step: Floats, push: Floats
     ) -> float:
         """-2 ln of the factors by which exact priors of some coordinates change the evidence."""
-        each = zip(numbers, variance.tolist(), step.tolist(), push.tolist(), strict=True)
-        return sum(
-            correction_of_prior(
-                self.coordinates[i], float(self.x[i]), 1.0 / v, s, p, held=bool(self.held[i])
-            )
-            for i, v, s, p in each
-        )
+        total = 0.0
+        for i, v, s, p in zip(numbers, variance, step, push, strict=True):
+            own, x, held = self.coordinates[i], float(self.x[i]), bool(self.held[i])
+            total += correction_of_prior(own, x, float(1.0 / v), float(s), float(p), held=held)
+        return total
 
 
 def linear_model(
