@@ -11,7 +11,7 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError, did_you_mean
 from soilml.numerics.prior import Prior
-from soilml.parameters import Parameter, declared
+from soilml.parameters import declared
 from soilml.physics.effects.base import Effect, SlipLoadScaling
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.quantities import SHEAR
@@ -106,8 +106,10 @@ def select_free(case: Case, names: Sequence[str] | None) -> list[Coordinate]:
             )
         parameter, nominal = known[path]
         prior = case.prior.get(path) or _DEFAULT_PRIORS.get(path)
-        if prior is None:
-            prior = _wide_prior(parameter, float(nominal))
+        if prior is None and 0.0 < nominal < parameter.upper / WIDE_BOUND:
+            lower = max(nominal / ASSUMED_FACTOR, parameter.lower)
+            prior = Prior(float(lower), float(nominal * ASSUMED_FACTOR), log=True)
+        prior = prior or Prior(parameter.lower, parameter.upper)
         free.append(Coordinate(path, parameter.unit, prior, float(nominal), path not in case.prior))
     return free
 
@@ -169,11 +171,3 @@ def rates_at(coordinates: Sequence[Coordinate], x: Floats) -> Floats:
     """Derivatives (p,) of the values by the coordinates, at x (p,)."""
     each = [float(c.rate(x[i : i + 1])[0]) for i, c in enumerate(coordinates)]
     return np.asarray(each, dtype=np.float64)
-
-
-def _wide_prior(parameter: Parameter, nominal: float) -> Prior:
-    """The parameter's bounds; about its value where they span too many decades."""
-    if nominal > 0.0 and parameter.upper > WIDE_BOUND * nominal:
-        lower = max(nominal / ASSUMED_FACTOR, parameter.lower)
-        return Prior(lower, nominal * ASSUMED_FACTOR, log=True)
-    return Prior(parameter.lower, parameter.upper)

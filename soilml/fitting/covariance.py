@@ -45,18 +45,22 @@ class Whitening:
     shrinkage: Floats  # (q,)
 
     @staticmethod
-    def of(std: Floats, columns: Floats) -> Whitening:
-        r"""From standard deviations (m,) of the noise and columns C (m, q) of the process.
+    def beside(noise: Any, columns: Floats) -> Whitening:
+        r"""From what whitens the noise, and columns C (m, q) of the process.
 
         .. math::
-            (I + B B^T)^{-1/2} D^{-1}
-            = \left[I - U \left(1 - (1 + s^2)^{-1/2}\right) U^T\right] D^{-1}, \quad
-            D = \operatorname{diag}(\sigma), \quad B = D^{-1} C = U s V^T
+            (I + B B^T)^{-1/2} W_0
+            = \left[I - U \left(1 - (1 + s^2)^{-1/2}\right) U^T\right] W_0, \quad
+            B = W_0 C = U s V^T
 
-        For residuals r the squared length of the result is r^T (D D + C C^T)^{-1} r.
+        For residuals r the squared length of the result is r^T (V + C C^T)^{-1} r, with the
+        covariance V of the noise.
         """
-        basis, size, _ = np.linalg.svd(columns / std[:, None], full_matrices=False)
-        return Whitening(1.0 / std, basis, 1.0 - 1.0 / np.sqrt(1.0 + size**2))
+        white = Whitening(noise, columns[:, :0], np.zeros(0)) @ columns
+        if not white.shape[1]:
+            return Whitening(noise, white, np.zeros(0))
+        basis, size, _ = np.linalg.svd(white, full_matrices=False)
+        return Whitening(noise, basis, 1.0 - 1.0 / np.sqrt(1.0 + size**2))
 
     def __matmul__(self, values: Floats) -> Floats:
         independent = np.ndim(self.noise) == 1
@@ -165,11 +169,8 @@ def discrepancy_process(
 def _learned_columns(learned: Remainder, readings: Readings, channel: int) -> Floats:
     """Columns (m, q) of the remainder of a channel; each gear has its own."""
     in_channel, parts = readings.channel == channel, [np.zeros((len(readings), 0))]
-    driven = np.broadcast_to(
-        "" if readings.at.gear is None else readings.at.gear, len(readings.run)
-    )
     for gear in dict.fromkeys(part.gear for part in learned.parts):
-        rows = in_channel & (driven[readings.row] == gear if gear else True)
+        rows = in_channel & (readings.driven_by("") == gear if gear else True)
         at = readings.slip[rows], readings.load[rows]
         own = learned.process_columns(readings.channels[channel], *at, gear, fitted_anew=True)
         parts.append(np.zeros((len(readings), own.shape[1])))
@@ -206,19 +207,13 @@ def noise_of_operation(
     slip, load = readings.row_slip, readings.row_load
     x = np.zeros(0) if x is None else x
     total = np.zeros(len(readings))
-    for name, values, std in (("slip", slip, readings.slip_std), ("load", load, readings.load_std)):
+    for name, values, std, low, high in (  # rows are moved where the model is defined
+        ("slip", slip, readings.slip_std, -MOST_SLIP, MOST_SLIP),
+        ("load", load, readings.load_std, LEAST_LOAD * load, MOST_LOAD * load),
+    ):
         if np.any(std > 0.0):
-            ends = [_moved(readings, name, values + sign * 0.5 * std) for sign in (-1.0, 1.0)]
-            low, high = (predict(case, coordinates, x[None, :], end)[0] for end in ends)
-            total = np.hypot(total, np.nan_to_num(high - low))
+            there = (np.clip(values + half * std, low, high) for half in (-0.5, 0.5))
+            ends = (replace(readings, at=replace(readings.at, **{name: v})) for v in there)
+            below, above = (predict(case, coordinates, x[None, :], end)[0] for end in ends)
+            total = np.hypot(total, np.nan_to_num(above - below))
     return np.asarray(total)
-
-
-def _moved(readings: Readings, name: str, values: Floats) -> Readings:
-    """The readings at other slips or loads (n,), kept where the model is defined."""
-    if name == "slip":
-        at = replace(readings.at, slip=np.clip(values, -MOST_SLIP, MOST_SLIP))
-    else:
-        load = readings.row_load
-        at = replace(readings.at, load=np.clip(values, LEAST_LOAD * load, MOST_LOAD * load))
-    return replace(readings, at=at)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,19 +48,14 @@ APART = Tolerance(enough=1e-4, share=1e-5, iterations=50, creeping=0.0)
 COARSE = Tolerance(enough=0.5, share=0.01, iterations=3, creeping=1.0)
 
 
-def descend_each(
-    problems: Sequence[LeastSquaresProblem],
-    starts: Sequence[Floats],
-    known: Sequence[Linearisation | None],
-) -> list[Solution | InputError]:
-    """Descents of problems from starts (p,); the error of one whose trials the model refuses."""
-    found: list[Solution | InputError] = []
-    for problem, start, near in zip(problems, starts, known, strict=True):
-        try:
-            found.append(descend(problem, start, near=near))
-        except InputError as error:
-            found.append(error)
-    return found
+def descent_if_any(
+    problem: LeastSquaresProblem, start: Floats, near: Linearisation | None = None
+) -> Solution | None:
+    """The descent from a start (p,); None where the model refuses its trials."""
+    try:
+        return descend(problem, start, near=near)
+    except InputError:
+        return None
 
 
 def descend(
@@ -124,7 +118,7 @@ def _step(at: Solution, damping: float) -> tuple[float, float, Floats]:
     A promise is the decrease of the linearised objective, up to the bounds.
     """
     problem, x = at.problem, at.x
-    deviation, rates = problem.terms.deviation(x), problem.terms.rates(x)
+    deviation, rates = problem.deviation(x), problem.rates(x)
     descent = at.residual @ at.jacobian - deviation @ rates
     normal, scale = _curvature(at)
     ends = problem.lower - x, problem.upper - x
@@ -155,7 +149,7 @@ def _corrected(last: Solution, new: Solution, damping: float) -> Floats:
 
 def _curvature(at: Solution) -> tuple[Floats, Floats]:
     """Half the curvature (p, p) of the linearised objective, and what damping adds to it."""
-    rates = at.problem.terms.rates(at.x)
+    rates = at.problem.rates(at.x)
     normal = at.jacobian.T @ at.jacobian + rates.T @ rates
     return normal, np.diag(np.diag(normal) + LEAST_SCALE)
 

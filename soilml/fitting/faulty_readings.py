@@ -62,7 +62,8 @@ def sound_rows(case: Case, table: Table) -> tuple[Table, list[Remark]]:
         for key in channels:
             spoilt, text = find(table, key, noise[key])
             if spoilt.any():
-                table = _blanked(table, key, spoilt)
+                sound = np.where(spoilt, np.nan, table[key])
+                table = replace(table, columns={**table.columns, key: sound})
                 remarks.append(_left_out(code, table, key, spoilt, text))
     for key in channels:
         table, remark = _with_noise_of_steps(case, table, key, noise[key])
@@ -148,9 +149,8 @@ def _without_repeated_rows(table: Table, noise: dict[str, float]) -> tuple[Table
     if copied:
         repeat = "repeats" if len(copied) == 1 else "repeat"
         text += f"; run{'s' * (len(copied) > 1)} {', '.join(copied)} {repeat} another run"
-    return table.rows(kept), [
-        Remark("duplicate-rows", text, tuple(copied), _severity(count, table))
-    ]
+    severity: Severity = "warning" if count > MANY * len(table) else "note"
+    return table.rows(kept), [Remark("duplicate-rows", text, tuple(copied), severity)]
 
 
 def _clipped(table: Table, key: str, noise: float) -> tuple[Booleans, str]:
@@ -180,22 +180,15 @@ def _clipped(table: Table, key: str, noise: float) -> tuple[Booleans, str]:
 def _held(table: Table, key: str, noise: float) -> tuple[Booleans, str]:
     """Readings that repeat that of the row before, in the order of time within their run."""
     values, spoilt = table[key], np.zeros(len(table), bool)
-    chance = _chance(values, noise)
+    if _chance(values, noise) * len(table) > BY_CHANCE:
+        return spoilt, ""
     run = table["run"] if "run" in table else np.zeros(len(table), dtype=np.int64)
     time = table["time_s"] if "time_s" in table else np.arange(len(table), dtype=np.float64)
     order = np.lexsort((time, np.unique(run, return_inverse=True)[1]))
     same_run = run[order[1:]] == run[order[:-1]]
     spoilt[order[1:]] = same_run & (values[order[1:]] == values[order[:-1]])
-    if chance * len(table) > BY_CHANCE:
-        spoilt[:] = False
-    return (
-        spoilt,
-        "the same as in the row before, to the last digit: the sensor or logger repeated it",
-    )
-
-
-def _blanked(table: Table, key: str, spoilt: Booleans) -> Table:
-    return replace(table, columns={**table.columns, key: np.where(spoilt, np.nan, table[key])})
+    text = "the same as in the row before, to the last digit: the sensor or logger repeated it"
+    return spoilt, text
 
 
 def _left_out(code: str, table: Table, key: str, spoilt: Booleans, text: str) -> Remark:
@@ -207,11 +200,6 @@ def _left_out(code: str, table: Table, key: str, spoilt: Booleans, text: str) ->
     are = "1 reading is" if rows.size == 1 else f"{rows.size} readings are"
     text = f"{key}: {are} left out ({where}), {text}"
     return Remark(code, text, (key,), "warning")
-
-
-def _severity(count: int, table: Table) -> Severity:
-    """A warning where many of the rows are concerned."""
-    return "warning" if count > MANY * len(table) else "note"
 
 
 def _with_noise_of_steps(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,17 +27,12 @@ COMPRESSED = 12.0  # Residual in standard deviations from which on the axis is c
 
 @dataclass(frozen=True)
 class FittedReadings:
-    """Readings (m,) of all channels with the predictions of a fitted model."""
+    """Readings (m,) of all channels with the predictions of a fitted model, SI units."""
 
-    channels: tuple[str, ...]  # columns
-    channel: NDArray[np.int64]  # index (m,) of each reading's
-    run: tuple[str, ...]  # of each reading
-    slip: Floats  # where it was measured
-    load: Floats  # N
-    measured: Floats  # readings and standard deviations of their noise, SI units
-    std: Floats
-    after: Floats  # predictions and their standard deviations by the uncertainty of the fit
-    after_std: Floats
+    readings: Readings
+    std: Floats  # standard deviations of their noise
+    after: Floats  # predictions and their variances by the uncertainty of the fit
+    after_variance: Floats
     before: Floats | None = None  # predictions without what was added to the model, if anything
 
     @staticmethod
@@ -63,39 +58,22 @@ class FittedReadings:
         for k in range(len(readings.channels)):
             own = (readings.channel == k) & ~np.isfinite(std)
             std[own] = np.sqrt(np.nanmean(residual[own] ** 2)) if own.any() else 1.0
-        return FittedReadings._of(readings, std, found.prediction, variance)
+        return FittedReadings(readings, std, found.prediction, variance)
 
     @staticmethod
     def of_solutions(before: Solution, after: Solution, std: Floats) -> FittedReadings:
         """Readings with the predictions of two fits; `std` (m,) is their noise."""
         readings, jacobian = after.problem.readings, after.derivatives
         variance = np.einsum("ij,jk,ik->i", jacobian, after.covariance, jacobian)
-        found = FittedReadings._of(readings, std, after.prediction, variance)
-        return replace(found, before=before.prediction)
-
-    @staticmethod
-    def _of(
-        readings: Readings, std: Floats, prediction: Floats, variance: Floats
-    ) -> FittedReadings:
-        return FittedReadings(
-            channels=tuple(map(column, readings.channels)),
-            channel=readings.channel,
-            run=tuple(readings.runs[readings.run[row]] for row in readings.row),
-            slip=readings.slip,
-            load=readings.load,
-            measured=readings.measured,
-            std=std,
-            after=prediction,
-            after_std=np.sqrt(np.maximum(variance, 0.0)),
-        )
+        return FittedReadings(readings, std, after.prediction, variance, before.prediction)
 
     def picture(self, with_added: str = "") -> Picture:
         """Readings and predictions over slip, a column of panels for each channel.
 
         with_added: What `after` has that `before` has not, in words.
         """
-        count = len(self.channels)
-        names = ", ".join(map(channel_name, self.channels))
+        columns = [column(name) for name in self.readings.channels]
+        count, names = len(columns), ", ".join(map(channel_name, columns))
         lines = "Lines: the model on the estimated soil, without errors that all rows share."
         if self.before is not None:
             lines = f"Dashed: the soil alone. Solid: {with_added or 'with what was added'}."
@@ -110,9 +88,9 @@ class FittedReadings:
 
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw the picture into axes (2, channels); see `take_axes`."""
-        count = len(self.channels)
-        axes = take_axes(ax, 2, count, (4.6 * count, 5.4))
-        for k, name in enumerate(self.channels):
+        columns = [column(name) for name in self.readings.channels]
+        axes = take_axes(ax, 2, len(columns), (4.6 * len(columns), 5.4))
+        for k, name in enumerate(columns):
             factor, unit = channel_unit(name)
             top, low = axes[:, k]
             for colour, load, rows, line in self._shown(k):
@@ -120,7 +98,7 @@ class FittedReadings:
             top.set_title(channel_name(name))
             top.set_ylabel(with_unit(channel_name(name), pretty(unit)))
             top.legend(ncols=2)
-            self._draw_residuals(low, np.flatnonzero(self.channel == k))
+            self._draw_residuals(low, np.flatnonzero(self.readings.channel == k))
             low.set_xlabel("slip")
             low.set_ylabel("residual, sigma")
             low.set_xlim(top.get_xlim())
@@ -131,28 +109,29 @@ class FittedReadings:
 
         The line is that of the run with most readings at this load: runs may differ in speed.
         """
-        own = np.flatnonzero((self.channel == channel) & np.isfinite(self.measured))
+        readings, load = self.readings, self.readings.load
+        own = np.flatnonzero((readings.channel == channel) & np.isfinite(readings.measured))
         if not own.size:
             return
-        levels = load_levels(self.load)
+        levels, run = load_levels(load), readings.run[readings.row]
         present = np.unique(levels.index[own])
         most = min(MOST_LOADS, len(present))
         picked = present[np.linspace(0, len(present) - 1, most).round().astype(int)]
         colours = np.linspace(0, len(LOADS) - 1, most).round().astype(int)
-        names = np.asarray(self.run, dtype=object)
         for level, colour in zip(picked, colours, strict=True):
             rows = own[levels.index[own] == level]
-            runs, counts = np.unique(names[rows].astype(str), return_counts=True)
-            line = rows[names[rows].astype(str) == runs[int(np.argmax(counts))]]
-            line = line[np.argsort(self.slip[line], kind="stable")]
-            yield LOADS[colour], float(np.median(self.load[rows])), rows, line
+            runs, counts = np.unique(run[rows], return_counts=True)
+            line = rows[run[rows] == runs[int(np.argmax(counts))]]
+            line = line[np.argsort(readings.slip[line], kind="stable")]
+            yield LOADS[colour], float(np.median(load[rows])), rows, line
 
     def _draw_load(
         self, axes: Any, factor: float, colour: str, load: float, *parts: NDArray[Any]
     ) -> None:
-        rows, line = parts
-        slip, after = self.slip[line], factor * self.after[line]
-        band = factor * Z_90 * np.hypot(self.after_std[line], self.std[line])
+        (rows, line), measured = parts, self.readings.measured
+        slip, after = self.readings.slip[line], factor * self.after[line]
+        variance = np.maximum(self.after_variance[line], 0.0) + self.std[line] ** 2
+        band = factor * Z_90 * np.sqrt(variance)
         if np.unique(slip).size > 1:
             axes.fill_between(slip, after - band, after + band, color=colour, alpha=0.15, lw=0)
             axes.plot(slip, after, color=colour, lw=1.7)
@@ -161,20 +140,19 @@ class FittedReadings:
         else:
             axes.errorbar(slip, after, band, fmt="_", color=colour, ms=14, lw=4, alpha=0.3)
         label = f"{significant(load, 3)} N"
-        axes.plot(
-            self.slip[rows], factor * self.measured[rows], "o", color=colour, ms=4, label=label
-        )
+        at = self.readings.slip[rows]
+        axes.plot(at, factor * measured[rows], "o", color=colour, ms=4, label=label)
 
     def _draw_residuals(self, axes: Any, rows: NDArray[Any]) -> None:
         axes.axhspan(-Z_90, Z_90, color=PRIOR, alpha=0.6, lw=0)
         axes.axhline(0.0, color=UNCHANGED, lw=0.8)
-        most = 3.5
+        slip, measured, most = self.readings.slip[rows], self.readings.measured[rows], 3.5
         shown = [(self.after, AFTER, "o", "with it")]
         if self.before is not None:
             shown.insert(0, (self.before, BEFORE, "x", "soil alone"))
         for prediction, colour, marker, label in shown:
-            residual = (self.measured[rows] - prediction[rows]) / self.std[rows]
-            axes.plot(self.slip[rows], residual, marker, color=colour, ms=3.6, label=label)
+            residual = (measured - prediction[rows]) / self.std[rows]
+            axes.plot(slip, residual, marker, color=colour, ms=3.6, label=label)
             finite = np.abs(residual[np.isfinite(residual)])
             most = max(most, 1.2 * float(finite.max()) if finite.size else 0.0)
         if self.before is not None:

@@ -6,7 +6,6 @@ from typing import NoReturn
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.damped_descents import APART, descend
@@ -30,7 +29,12 @@ def global_optimum(problem: LeastSquaresProblem) -> Solution:
 
     Raises `FitError` where no parameters in the prior carry the measured loads.
     """
-    starts, order = _ranked_starts(problem)
+    nominal = np.asarray([c.prior.fraction(c.nominal) for c in problem.coordinates])
+    soils = latin_hypercube(POINTS, len(nominal), np.random.default_rng(SEED))
+    starts = np.vstack([nominal, soils])
+    costs = (problem.whitened(problem.predict(starts)) ** 2).sum(axis=1)
+    costs += (problem.soil_tests.deviation(starts) ** 2).sum(axis=1)
+    order = np.argsort(costs, kind="stable").tolist()
     found: list[Solution] = []
     for i in dict.fromkeys([*order[:STARTS], 0]):  # the nominal point too
         found.append(descend(problem, starts[i], APART))
@@ -43,16 +47,6 @@ def global_optimum(problem: LeastSquaresProblem) -> Solution:
     lowest = min(o.objective for o in found)
     equal = [o for o in found if o.objective <= lowest + EQUAL_COST]
     return min(equal, key=lambda optimum: float(np.sum((optimum.x - 0.5) ** 2)))
-
-
-def _ranked_starts(problem: LeastSquaresProblem) -> tuple[Floats, list[int]]:
-    """Points (n, p) of the prior, the nominal one first, and their order by rising cost."""
-    nominal = np.asarray([c.prior.fraction(c.nominal) for c in problem.coordinates])
-    soils = latin_hypercube(POINTS, len(nominal), np.random.default_rng(SEED))
-    starts = np.vstack([nominal, soils])
-    costs = (problem.whitened(problem.predict(starts)) ** 2).sum(axis=1)
-    costs += (problem.soil_tests.deviation(starts) ** 2).sum(axis=1)
-    return starts, [int(i) for i in np.argsort(costs, kind="stable")]
 
 
 def raise_uncarried(case: Case, at: Operating) -> NoReturn:

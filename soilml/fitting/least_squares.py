@@ -53,32 +53,6 @@ class SoilTestTerms:
 
 
 @dataclass(frozen=True)
-class PriorTerms:
-    r"""Deviations of unit variance that stand beside the residuals: of tests and of priors.
-
-    .. math:: z_i = (x_i - m_i) / s_i + \theta_i(x_i) / \sigma_i
-
-    for each coordinate, of which one part at most is not zero.
-    """
-
-    tests: SoilTestTerms
-    middle: Floats  # (p,) m of a Gaussian distribution of the coordinate
-    root: Floats  # (p,) 1 / s, root of its precision; 0 where there is none
-    normal_std: Floats  # (p,) sigma of normal priors of the value about zero; infinite without
-
-    def deviation(self, x: Floats) -> Floats:
-        """Deviations (..., t + p) at coordinates x (..., p)."""
-        of_values = values_at(self.tests.coordinates, x) / self.normal_std
-        own = self.root * (x - self.middle) + of_values
-        return np.concatenate([self.tests.deviation(x), own], axis=-1)
-
-    def rates(self, x: Floats) -> Floats:
-        """Derivatives (t + p, p) of the deviations at coordinates x (p,)."""
-        own = self.root + rates_at(self.tests.coordinates, x) / self.normal_std
-        return np.vstack([self.tests.rates(x), np.diag(own)])
-
-
-@dataclass(frozen=True)
 class LeastSquaresProblem:
     r"""Readings y with covariance, and the case that is fitted to them.
 
@@ -101,15 +75,33 @@ class LeastSquaresProblem:
         return SoilTestTerms(self.case, self.coordinates)
 
     @cached_property
-    def terms(self) -> PriorTerms:
-        """Deviations that stand beside the residuals."""
-        normal_std = np.asarray([c.prior.normal_std or np.inf for c in self.coordinates])
-        if not self.priors:
-            normal_std = np.full(len(normal_std), np.inf)
+    def normal_std(self) -> Floats:
+        """Standard deviation (p,) of normal priors of the value about zero; infinite without."""
+        known = [c.prior.normal_std or np.inf for c in self.coordinates]
+        return np.asarray(known if self.priors else [np.inf] * len(known), float)
+
+    @cached_property
+    def _gaussian(self) -> tuple[Floats, Floats]:
+        """Middle and root of the precision, (p,) each, of Gaussian priors of the coordinates."""
         of_size = np.asarray([1.0 / c.std for c in self.coordinates])
-        uniform = (of_size == 0.0) & np.isinf(normal_std) & (self.priors == "all")
-        root = np.where(uniform, np.sqrt(UNIFORM_PRECISION), of_size)
-        return PriorTerms(self.soil_tests, np.where(uniform, 0.5, 0.0), root, normal_std)
+        uniform = (of_size == 0.0) & np.isinf(self.normal_std) & (self.priors == "all")
+        return np.where(uniform, 0.5, 0.0), np.where(uniform, np.sqrt(UNIFORM_PRECISION), of_size)
+
+    def deviation(self, x: Floats) -> Floats:
+        r"""Deviations z (..., t + p) of unit variance from tests and priors, at x (..., p).
+
+        .. math:: z_i = (x_i - m_i) / s_i + \theta_i(x_i) / \sigma_i
+
+        for each coordinate, of which one part at most is not zero.
+        """
+        middle, root = self._gaussian
+        own = root * (x - middle) + values_at(self.coordinates, x) / self.normal_std
+        return np.concatenate([self.soil_tests.deviation(x), own], axis=-1)
+
+    def rates(self, x: Floats) -> Floats:
+        """Derivatives (t + p, p) of the deviations at coordinates x (p,)."""
+        own = self._gaussian[1] + rates_at(self.coordinates, x) / self.normal_std
+        return np.vstack([self.soil_tests.rates(x), np.diag(own)])
 
     @cached_property
     def lower(self) -> Floats:
@@ -141,7 +133,7 @@ class LeastSquaresProblem:
 
     def objective(self, residual: Floats, x: Floats) -> Floats:
         """What is minimised, at whitened residuals (..., m) and coordinates (..., p)."""
-        of_terms = (self.terms.deviation(x) ** 2).sum(axis=-1)
+        of_terms = (self.deviation(x) ** 2).sum(axis=-1)
         return np.asarray((residual**2).sum(axis=-1) + of_terms)
 
     def at(self, x: Floats, linearisation: Linearisation) -> Solution:

@@ -69,13 +69,7 @@ class Levels:
     """The levels of values (n,), ascending."""
 
     index: Integers  # (n,) level of each value
-    low: Floats  # (k,) ends of each level
-    high: Floats
-
-    @property
-    def count(self) -> int:
-        """Number of levels; a range without gaps counts as several."""
-        return len(self.low)
+    count: int  # number of levels; a range without gaps counts as several
 
 
 def find_levels(values: Floats, rule: LevelRule, run: Integers | None = None) -> Levels:
@@ -113,8 +107,7 @@ def find_levels(values: Floats, rule: LevelRule, run: Integers | None = None) ->
         for part in _divide_range(fine, rule)
     ]
     low = np.asarray([group[0, 0] for group in groups])
-    high = np.asarray([group[0, -1] for group in groups])
-    return Levels(np.searchsorted(low, values, side="right") - 1, low, high)
+    return Levels(np.searchsorted(low, values, side="right") - 1, len(groups))
 
 
 def _divide(pairs: Floats, smallest: float, rule: LevelRule, *, repeated: bool) -> list[Floats]:
@@ -155,10 +148,7 @@ def _divide_range(pairs: Floats, rule: LevelRule) -> list[Floats]:
 
 
 def load_levels(load: Floats, run: Integers | None = None, std: float = 0.0) -> Levels:
-    """The levels of loads (n,) > 0, N; `std` is the measurement noise of a load, N.
-
-    The ends of the levels are logarithms of loads.
-    """
+    """The levels of loads (n,) > 0, N; `std` is the measurement noise of a load, N."""
     load = np.asarray(load, dtype=np.float64)
     rule = LOG_LOAD_RULE.with_noise(std / float(np.median(load))) if std else LOG_LOAD_RULE
     return find_levels(np.log(load), rule, run)

@@ -13,11 +13,7 @@ from soilml.config.case import Case
 from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate
-from soilml.fitting.covariance import (
-    Whitening,
-    discrepancy_process,
-    noise_of_operation,
-)
+from soilml.fitting.covariance import Whitening, discrepancy_process, noise_of_operation
 from soilml.fitting.damped_descents import EXACT, FINE, descend
 from soilml.fitting.error_columns import error_columns, stacked
 from soilml.fitting.global_optimum import global_optimum
@@ -43,14 +39,20 @@ def problem_under_noise(
         residuals. By default noise is as declared, and the soil that of the case.
     """
     if optimum is None:
-        soil, weighted, otherwise = case, readings, _initial_noise(readings)
+        square = _mean_by_channel(readings, readings.measured**2)
+        soil, weighted, otherwise = case, readings, INITIAL_NOISE * np.sqrt(square) + 1e-12
     else:
         soil, weighted = optimum.fitted(), readings.with_noise_at(optimum.prediction)
         weighted = weighted.with_noise_of_operation(noise_of_operation(soil, readings))
-        residual = optimum.problem.residual(optimum.prediction)
-        otherwise = _residual_noise(readings, residual, len(free))
+        # noise of each channel from its residuals, the parameters shared among all readings
+        square = optimum.problem.residual(optimum.prediction) ** 2
+        size = np.bincount(readings.channel)[readings.channel]
+        freedom = np.maximum(size * (1.0 - len(free) / len(readings)), 1.0)
+        scatter = np.sqrt(_mean_by_channel(readings, square) * size / freedom)
+        least = 1e-6 * np.sqrt(_mean_by_channel(readings, readings.measured**2)) + 1e-15
+        otherwise = np.maximum(scatter, least)
     std = np.where(np.isfinite(weighted.std), weighted.std, otherwise)
-    whiten = Whitening.of(std, columns_of_errors(soil, readings))
+    whiten = Whitening.beside(1.0 / std, columns_of_errors(soil, readings))
     return LeastSquaresProblem(case, free, replace(weighted, std=std), whiten, "normal")
 
 
@@ -62,21 +64,6 @@ def columns_of_errors(case: Case, readings: Readings) -> Floats:
         return columns
     shared = stacked(error_columns(case, readings, readings.shared_errors), len(readings))
     return np.hstack([columns, shared])
-
-
-def _initial_noise(readings: Readings) -> Floats:
-    """A fraction of each channel's RMS reading, (m,)."""
-    square = _mean_by_channel(readings, readings.measured**2)
-    return np.asarray(INITIAL_NOISE * np.sqrt(square) + 1e-12)
-
-
-def _residual_noise(readings: Readings, residual: Floats, p: int) -> Floats:
-    """Noise of each channel (m,) from its residuals, p parameters shared among all readings."""
-    size = np.bincount(readings.channel)[readings.channel]
-    freedom = np.maximum(size * (1.0 - p / len(readings)), 1.0)
-    scatter = np.sqrt(_mean_by_channel(readings, residual**2) * size / freedom)
-    least = 1e-6 * np.sqrt(_mean_by_channel(readings, readings.measured**2)) + 1e-15
-    return np.asarray(np.maximum(scatter, least))
 
 
 def _mean_by_channel(readings: Readings, values: Floats) -> Floats:
@@ -103,11 +90,10 @@ class Misfit:
     readings: int
 
     @staticmethod
-    def of(optimum: Solution, readings: Readings, parameters: int) -> Misfit:
-        """That of an optimum, of which the first coordinates are the parameters."""
-        squares = optimum.cost
-        count = len(readings)
-        return Misfit(float(squares), count - parameters, count)
+    def of(optimum: Solution) -> Misfit:
+        """That of an optimum."""
+        count = len(optimum.problem.readings)
+        return Misfit(optimum.cost, count - len(optimum.x), count)
 
     @property
     def per_freedom(self) -> float:
@@ -164,20 +150,14 @@ def declared_misfit(
         optimum = fit_under_declared_noise(case, readings, free, start)
     except FitError:
         return None
-    return Misfit.of(optimum, readings, len(free))
-
-
-def excess_residuals(factor: float, with_discrepancy: bool) -> str:
-    """How many times the declared noise the residuals are, in words."""
-    discrepancy = " and discrepancy" if with_discrepancy else ""
-    return f"residuals are {factor:.1f} times the declared noise{discrepancy}"
+    return Misfit.of(optimum)
 
 
 def excess_residuals_remark(factor: float, case: Case, consequence: str) -> Remark:
     """That residuals are `factor` times the declared noise, and what follows."""
-    found = excess_residuals(factor, bool(case.discrepancy))
     text = (
-        f"{found}: the model lacks an effect, the soil changed between "
-        f"rows, or the noise is understated; {consequence}"
+        f"residuals are {factor:.1f} times the declared noise"
+        f"{' and discrepancy' if case.discrepancy else ''}: the model lacks an effect, the soil "
+        f"changed between rows, or the noise is understated; {consequence}"
     )
     return Remark("excess-residuals", text)

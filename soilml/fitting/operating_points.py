@@ -39,7 +39,6 @@ def gear_numbers(at: Operating) -> NDArray[np.int64]:
 class GearRows:
     """The rows that one of several gears drove."""
 
-    name: str  # Of the gear
     case: Case  # The case of this gear alone
     rows: NDArray[np.int64]  # Positions (k,) of its rows among all
     at: Operating  # Their operating points
@@ -56,7 +55,7 @@ def rows_by_gear(case: Case, at: Operating) -> Iterator[GearRows]:
         rows = np.flatnonzero(driven == name)
         if rows.size:
             own = replace(operating_points_of_rows(at, rows), gear=None)
-            yield GearRows(name, case.of_gear(name), rows, own, case.paths_of_gear(name))
+            yield GearRows(case.of_gear(name), rows, own, case.paths_of_gear(name))
 
 
 def operating_points_of_rows(at: Operating, rows: NDArray[np.int64]) -> Operating:

@@ -69,10 +69,8 @@ def predict(
             force = in_chunks_near(load_case, sensor_readings, _raveled(start))
         return _stacked(case, readings, force)
     y = np.full((len(x), len(readings)), np.nan)
-    for part in _readings_by_gear(case, coordinates, readings):
-        near = _of_rows(start, part.rows)
-        own = predict(part.case, part.coordinates, x[:, part.kept], part.readings, near)
-        y[:, part.selected] = own
+    for of_gear, free, part, kept, rows, chosen in _readings_by_gear(case, coordinates, readings):
+        y[:, chosen] = predict(of_gear, free, x[:, kept], part, _of_rows(start, rows))
     return y
 
 
@@ -102,15 +100,13 @@ def linearise(
         x, np.full(m, np.nan), np.zeros((m, p)), np.full(n, np.nan), np.zeros((p, n)),
         np.full(n, np.nan),
     )  # fmt: skip
-    for part in _readings_by_gear(case, coordinates, readings):
-        own = _linearised(
-            part.case, part.coordinates, x[part.kept], part.readings, _of_rows(start, part.rows)
-        )
-        joined.prediction[part.selected] = own.prediction
-        joined.jacobian[np.ix_(part.selected, part.kept)] = own.jacobian
-        joined.log_sinkage[part.rows] = own.log_sinkage
-        joined.log_sinkage_rate[np.ix_(part.kept, part.rows)] = own.log_sinkage_rate
-        joined.slope[part.rows] = own.slope
+    for of_gear, free, part, kept, rows, chosen in _readings_by_gear(case, coordinates, readings):
+        own = _linearised(of_gear, free, x[kept], part, _of_rows(start, rows))
+        joined.prediction[chosen] = own.prediction
+        joined.jacobian[np.ix_(chosen, kept)] = own.jacobian
+        joined.log_sinkage[rows] = own.log_sinkage
+        joined.log_sinkage_rate[np.ix_(kept, rows)] = own.log_sinkage_rate
+        joined.slope[rows] = own.slope
     return joined
 
 
@@ -147,29 +143,21 @@ def forces_of_one_gear(case: Case, at: Operating) -> Force:
     return force if case.remainder is None else case.remainder.added_to(force, at.slip, at.load)
 
 
-@dataclass(frozen=True)
-class _GearReadings:
-    """The readings of one gear, with its case and the coordinates that act on it."""
-
-    case: Case
-    coordinates: list[Coordinate]
-    kept: Integers  # (p,) positions of these coordinates among all
-    readings: Readings
-    rows: Integers  # (n,) positions of the rows
-    selected: Integers  # (m,) positions of the readings
-
-
 def _readings_by_gear(
     case: Case, coordinates: Sequence[Coordinate], readings: Readings
-) -> Iterator[_GearReadings]:
-    """The readings of each gear of a case with several; a gear without readings is left out."""
+) -> Iterator[tuple[Case, list[Coordinate], Readings, Integers, Integers, Integers]]:
+    """The readings of each gear of a case with several; a gear without readings is left out.
+
+    Case, coordinates and readings of the gear, and positions among all: of the coordinates that act
+    on it, of its rows and of its readings.
+    """
     for gear in rows_by_gear(case, readings.at):
         selected, own = readings.of_rows(gear.rows, gear.at)
         if selected.any():
             kept = [i for i, c in enumerate(coordinates) if c.path in gear.paths]
             free = [replace(coordinates[i], path=gear.paths[coordinates[i].path]) for i in kept]
             at, chosen = np.asarray(kept, dtype=np.int64), np.flatnonzero(selected)
-            yield _GearReadings(gear.case, free, at, own, gear.rows, chosen)
+            yield gear.case, free, own, at, gear.rows, chosen
 
 
 def _of_rows(start: SinkageEstimate | None, rows: Integers) -> SinkageEstimate | None:

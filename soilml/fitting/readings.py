@@ -18,7 +18,6 @@ from soilml.fitting.levels import Levels, load_levels, replicate_rows, slip_leve
 from soilml.fitting.operating_points import gear_numbers, operating_points, operating_points_of_rows
 from soilml.fitting.shared_errors import declared_errors
 from soilml.io.table import Table
-from soilml.physics.effects.base import REFERENCE_LOAD, log_relative_slip
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
@@ -48,11 +47,10 @@ class Readings:
     channel: Integers  # (m,) its index in `channels`
     measured: Floats  # (m,) measured values, of planned rows the expected ones
     std: Floats  # (m,) their noise: as declared, NaN where it is not; in a fit, as it is taken
-    noise: tuple[Noise | None, ...]  # of each channel, as the case declares it
-    from_case: Booleans  # (m,) whether that is the noise of a reading; else it is in the table
+    constant: Floats  # (m,) absolute part of the noise of the sensors; NaN where undeclared
+    share: Floats  # (m,) their relative part, as a fraction of the expected reading
     slip_std: Floats  # (n,) declared noise; 0 where none is declared
     load_std: Floats  # (n,) likewise, N
-    sensor_std: Floats | None = None  # (m,) `std` without noise of slip and load, if these are in
     notes: tuple[Remark, ...] = ()  # on the table
     #: Standard deviations of the errors that all rows share, by name: as [bias] declares them, or
     #: with those that sensors and models typically have
@@ -64,7 +62,6 @@ class Readings:
         channels: Sequence[str] = CHANNELS,
         measured: Floats | None = None,
         std: Floats | None = None,
-        noise: Sequence[Noise | None] | None = None,
         run: Integers | None = None,
         runs: Sequence[str] = ("",),
     ) -> Readings:
@@ -81,8 +78,8 @@ class Readings:
             channel=np.repeat(np.arange(c), n),
             measured=unknown if measured is None else measured,
             std=unknown if std is None else std,
-            noise=(None,) * c if noise is None else tuple(noise),
-            from_case=np.ones(n * c, bool),
+            constant=unknown if std is None else std,
+            share=np.zeros(n * c),
             slip_std=exact,
             load_std=exact,
         )
@@ -110,10 +107,10 @@ class Readings:
         """Load of each reading, (m,), N."""
         return np.asarray(self.row_load[self.row])
 
-    @property
-    def gear(self) -> Integers:
-        """Number of the gear that drove each reading, (m,); 0 where none is named."""
-        return gear_numbers(self.at)[self.row]
+    def driven_by(self, unnamed: str) -> NDArray[np.str_]:
+        """Name of the gear that drove each reading, (m,); `unnamed` where the rows name none."""
+        gear = np.asarray(unnamed if self.at.gear is None else self.at.gear)
+        return np.asarray(np.broadcast_to(gear, len(self.run))[self.row])
 
     @property
     def row_count(self) -> int:
@@ -125,14 +122,6 @@ class Readings:
         """Columns of the channels with a reading whose noise is not declared."""
         unknown = np.unique(self.channel[~np.isfinite(self.std)])
         return tuple(column(self.channels[i]) for i in unknown)
-
-    @property
-    def log_slip_and_load(self) -> tuple[Floats, Floats]:
-        """Logarithms of slip and load, each (m,), whose coefficients are the shapes of laws.
-
-        They are zero at the slip and load where the size of an effect is its parameter's value.
-        """
-        return log_relative_slip(self.slip), np.log(self.load / REFERENCE_LOAD)
 
     @cached_property
     def slip_levels(self) -> Levels:
@@ -192,8 +181,8 @@ class Readings:
             channel=self.channel[selected],
             measured=self.measured[selected],
             std=self.std[selected],
-            from_case=self.from_case[selected],
-            sensor_std=None if self.sensor_std is None else self.sensor_std[selected],
+            constant=self.constant[selected],
+            share=self.share[selected],
         )
 
     def of_channels(self, kept: Sequence[int]) -> Readings:
@@ -202,7 +191,6 @@ class Readings:
         return replace(
             readings,
             channels=tuple(self.channels[i] for i in kept),
-            noise=tuple(self.noise[i] for i in kept),
             channel=np.searchsorted(np.asarray(kept), readings.channel).astype(np.int64),
         )
 
@@ -226,21 +214,17 @@ class Readings:
         What the table gives stays as it is, and so does that of readings without an expected
         value. A standard deviation is at least a thousandth of its channel's median.
         """
-        own = self.std if self.sensor_std is None else self.sensor_std
-        shares = [i for i, n in enumerate(self.noise) if n is not None and n.share > 0.0]
-        std = np.broadcast_to(own, expected.shape)
-        std = std.copy() if shares else std
-        for i in shares:
-            kept, noise = np.flatnonzero(self.from_case & (self.channel == i)), self.noise[i]
-            assert noise is not None
-            there = noise.std(expected[..., kept])
-            std[..., kept] = np.where(there >= 0.0, there, std[..., kept])
+        there = np.sqrt(self.constant**2 + (self.share * expected) ** 2)
+        std = np.where(there >= 0.0, there, self._declared_std)
         return np.asarray(np.fmax(std, self._least_std))
 
     @cached_property
+    def _declared_std(self) -> Floats:
+        return np.sqrt(self.constant**2 + (self.share * self.measured) ** 2)
+
+    @cached_property
     def _least_std(self) -> Floats:
-        own = self.std if self.sensor_std is None else self.sensor_std
-        least = np.zeros(len(self))
+        own, least = self._declared_std, np.zeros(len(self))
         for positions in self._by_channel:
             if np.isfinite(own[positions]).all() and positions.size:
                 least[positions] = LEAST_OF_MEDIAN * np.median(own[positions])
@@ -248,11 +232,11 @@ class Readings:
 
     def with_noise_at(self, expected: Floats) -> Readings:
         """The readings with the noise that is declared for the expected values (m,)."""
-        return replace(self, std=self.noise_at(expected), sensor_std=None)
+        return replace(self, std=self.noise_at(expected))
 
     def with_noise_of_operation(self, std: Floats) -> Readings:
         """The readings with noise (m,) in addition that their slip and load cause."""
-        return replace(self, std=np.hypot(self.std, std), sensor_std=self.std)
+        return replace(self, std=np.hypot(self.std, std))
 
     def with_known_noise(self) -> Readings:
         """The channels with known noise, if there are any, with notes about the others."""
@@ -269,8 +253,11 @@ class Readings:
 
     def with_default_std(self, std: Mapping[str, float]) -> Readings:
         """The readings with these standard deviations, by channel, where none is declared."""
-        default = np.asarray([std.get(self.channels[i], np.nan) for i in self.channel])
-        return replace(self, std=np.where(np.isfinite(self.std), self.std, default))
+        default, known = np.asarray([*map(std.get, self.channels)], float), np.isfinite(self.std)
+        own, constant = (
+            np.where(known, x, default[self.channel]) for x in (self.std, self.constant)
+        )
+        return replace(self, std=own, constant=constant)
 
 
 def stack_readings(case: Case, table: Table, *, refuse_zeros: bool = False) -> Readings:
@@ -290,7 +277,7 @@ def stack_readings(case: Case, table: Table, *, refuse_zeros: bool = False) -> R
     for r in range(len(runs)):
         rows = np.flatnonzero(number == r)
         order[rows[np.argsort(time[rows], kind="stable")]] = np.arange(rows.size)
-    found: list[tuple[NDArray[Any], ...]] = [(np.zeros(0),) * 5]
+    found: list[tuple[NDArray[Any], ...]] = [(np.zeros(0),) * 6]
     notes: list[Remark] = []
     for i, name in enumerate(names):
         key = column(name)
@@ -302,9 +289,11 @@ def stack_readings(case: Case, table: Table, *, refuse_zeros: bool = False) -> R
         if zero.any():
             std, note = _without_zeros(std, zero, table, kept, key, refuse_zeros)
             notes += note
-        from_case = ~np.isfinite(own) & ~zero
-        found.append((kept, np.full(kept.size, i), measured, std, from_case))
-    row, channel, measured, std, from_case = map(np.concatenate, zip(*found, strict=True))
+        noise, by_case = case.noise.get(key, Noise()), ~np.isfinite(own) & ~zero & np.isfinite(std)
+        constant = np.where(by_case, noise.constant, std)
+        share = np.where(by_case, noise.share, 0.0)
+        found.append((kept, np.full(kept.size, i), measured, std, constant, share))
+    row, channel, measured, std, constant, share = map(np.concatenate, zip(*found, strict=True))
     return Readings(
         at=operating_points(table),
         run=number.astype(np.int64),
@@ -315,8 +304,8 @@ def stack_readings(case: Case, table: Table, *, refuse_zeros: bool = False) -> R
         channel=channel.astype(np.int64),
         measured=measured,
         std=std,
-        noise=tuple(case.noise.get(column(name)) for name in names),
-        from_case=from_case.astype(bool),
+        constant=constant,
+        share=share,
         slip_std=np.nan_to_num(positive_std(case, table, "slip")),
         load_std=np.nan_to_num(positive_std(case, table, "load_N")),
         shared_errors=declared_errors(case),

@@ -41,7 +41,8 @@ def with_order_columns(case: Case, table: Table, fields: Collection[str] | None 
     columns = {}
     runs = np.unique(table["run"]).size if "run" in table else 1
     timed = _has_times(table)
-    if not (timed or _runs_stand_together(table)):
+    changes = int(np.count_nonzero(table["run"][1:] != table["run"][:-1])) if "run" in table else 0
+    if not (timed or changes == runs - 1):  # the rows of each run stand together
         return table
     if (
         "progress" in wanted
@@ -79,14 +80,6 @@ def _has_times(table: Table) -> bool:
     spans = sorted((time[run == r].min(), time[run == r].max()) for r in np.unique(run))
     apart = all(end <= start for (_, end), (start, _) in pairwise(spans))
     return apart and float(np.ptp(time)) > 0.0
-
-
-def _runs_stand_together(table: Table) -> bool:
-    """Whether the rows of each run follow each other."""
-    if "run" not in table:
-        return True
-    changes = int(np.count_nonzero(table["run"][1:] != table["run"][:-1]))
-    return changes == np.unique(table["run"]).size - 1
 
 
 def share_by_driving(order: Floats, slip: Floats, load: Floats) -> float:

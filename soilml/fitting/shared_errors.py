@@ -81,7 +81,8 @@ def usual_errors(case: Case, load: NDArray[np.float64], unknown: Sequence[str]) 
     of_sensors = {
         name: std
         for name, std in usual.items()
-        if _column_of(name) not in case.bias and EFFECT_OF_ERROR[name] not in effects
+        if EFFECT_OF_ERROR[name] not in effects
+        and not any(name in KNOWN_PARTS[key] for key in case.bias)
     }
     gears = [model.gear for model in (case.gears or {"": case.model}).values()]
     nil = without_errors(unknown, effects, gears)
@@ -105,11 +106,6 @@ def without_errors(
     if any(isinstance(gear, EmulatedGear) and "kphi" not in gear.inputs for gear in gears):
         nil |= {"bearing", "bearing_by_slip", "bearing_by_load"}  # the runs do not vary it
     return nil
-
-
-def _column_of(name: str) -> str:
-    """Column of the sensor whose error has this name."""
-    return next(key for key, parts in KNOWN_PARTS.items() if name in parts)
 
 
 LEAST, MOST = -50.0, 50.0  # Bounds of an error of size 1, far outside of what is looked for

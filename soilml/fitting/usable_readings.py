@@ -102,21 +102,14 @@ def _remarks_on(case: Case, table: Table) -> list[Remark]:
     runs = len(np.unique(table["run"])) if "run" in table else 1
     if runs > 1:
         notes.append(Remark("runs-as-one-soil", f"{runs} runs are fitted as one soil"))
-    if case.gears:
-        for name in case.gears:
-            rows = table.rows(operating_points(table).gear == name) if "gear" in table else table
-            notes += _grouser_remark(case.of_gear(name), rows, f"the gear {name}")
-    else:
-        notes += _grouser_remark(case, table, "the model")
-    return notes
-
-
-def _grouser_remark(case: Case, table: Table, owner: str) -> list[Remark]:
-    """Whether the wheel of a table has grousers that the model lacks."""
     lugs = QUANTITIES["grouser_height"].column
-    if lugs in table and np.nanmax(table[lugs], initial=0.0) > 0.0:
-        height = float(np.nanmax(table[lugs]))
-        if not any(effect.name == "grousers" for effect in case.model.effects):
+    gears = {name: case.of_gear(name) for name in case.gears} or {"": case}
+    for name, own in gears.items() if lugs in table else ():
+        named = name and "gear" in table
+        heights = table[lugs][operating_points(table).gear == name] if named else table[lugs]
+        height = float(np.nanmax(heights, initial=0.0))
+        if height > 0.0 and not any(effect.name == "grousers" for effect in own.model.effects):
+            owner = f"the gear {name}" if name else "the model"
             text = f"{lugs} is {height:g}, but {owner} has no effect grousers"
-            return [Remark("grousers-missing", text, ("grousers",))]
-    return []
+            notes.append(Remark("grousers-missing", text, ("grousers",)))
+    return notes

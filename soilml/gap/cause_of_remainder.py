@@ -9,7 +9,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.fitting.coordinates import Coordinate
-from soilml.gap.held_out import held_out_folds
+from soilml.gap.held_out import held_out_folds, log_score
 from soilml.gap.results import RemainderCause
 from soilml.gap.stage_changes import OPERATING, stage_changes
 from soilml.inference.constants import IN_CATALOGUE
@@ -17,7 +17,7 @@ from soilml.inference.evidence import LinearisedFit, linear_model
 from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import Hyperparameters
 from soilml.inference.posterior import Posterior
-from soilml.inference.priors import densities_of_amplitude
+from soilml.inference.priors import LOG_2PI, densities_of_amplitude
 from soilml.numerics.prior import Prior
 from soilml.numerics.smooth_process import process_columns
 from soilml.physics.operating_point import COVARIATES
@@ -127,17 +127,10 @@ def _predictive_gain(
 ) -> float:
     """Log density of rows kept back with the change, above that without; nil without such rows."""
     parts, at = held_out_folds(posterior.terms.readings, seed).values(), best.at
-    assert at is not None
+    if not parts or at is None:
+        return 0.0
     changed = _beside_changes(posterior, node, best.columns, best.amplitude)
-    sums = [
-        sum(
-            changed.log_density(at, folds.fold == k)
-            - node.linear.log_density(node.at, folds.fold == k)
-            for k in folds.predicted
-        )
-        for folds in parts
-    ]
-    return float(np.mean(sums)) if sums else 0.0
+    return log_score(changed, at, parts) - log_score(node.linear, node.at, parts)
 
 
 def _beside_changes(
@@ -208,9 +201,36 @@ def _weighed(posterior: Posterior, node: Explanation) -> tuple[float, list[Stage
         none = min(none, wide.evidence_with(products, constant, range(p), p)[0])
         for i, (one, end) in enumerate(zip(found, last, strict=True)):
             own = range(end - one.columns.shape[1], end)
-            values = wide.evidence_of_amplitudes(products, constant, p, own, AMPLITUDES) + penalties
+            values = _by_amplitude(wide, products, constant, p, own) + penalties
             k = int(np.argmin(values))
             if values[k] < one.value:
                 best = float(values[k]), pattern, float(AMPLITUDES[k])
                 found[i] = replace(one, value=best[0], at=best[1], amplitude=best[2])
     return none, found
+
+
+def _by_amplitude(
+    model: LinearisedFit, products: Floats, constant: float, first: int, changes: Sequence[int]
+) -> Floats:
+    """Evidence of a model with the weights of some columns at each of `AMPLITUDES`.
+
+    products, constant: By `LinearisedFit.reduced`.
+    first: Coordinates before it are always in the model.
+    changes: Numbers of the columns, whose weights are normal about zero.
+
+    One eigenvalue problem answers for all amplitudes.
+    """
+    curvature = products[:first, :first] + np.diag(model.precision[:first])
+    curvature += model.information[:first, :first]
+    across = products[np.ix_(range(first), changes)]
+    own, b = products[np.ix_(changes, changes)], products[:first, -1] - model.pull[:first]
+    free, precision = ~model.held[:first], AMPLITUDES[:, None] ** -2
+    step = np.linalg.solve(curvature[np.ix_(free, free)], np.column_stack([across, b])[free])
+    left, left_b = own - across[free].T @ step[:, :-1], products[changes, -1]
+    value, vector = np.linalg.eigh(left)
+    gain = (vector.T @ (left_b - across[free].T @ step[:, -1])) ** 2 / (value + precision)
+    whole = own - across.T @ np.linalg.solve(curvature, across)
+    determinants = np.log(np.linalg.eigvalsh(whole) + precision)
+    fixed = products[-1, -1] - b[free] @ step[:, -1] + np.linalg.slogdet(curvature)[1]
+    fixed += constant - first * LOG_2PI + model.cost + model.constant[:first].sum()
+    return np.asarray(fixed + (determinants - np.log(precision) - gain).sum(axis=1))

@@ -83,7 +83,10 @@ def decide(
     none, reasons = posterior.no_effect, tuple(obstacles)
     ranked = ranked_sets(posterior)
     chance = posterior.probability(*ranked[0]) if ranked else 0.0
-    if _is_other_soil(posterior) and none > max(constants.UNCERTAIN, chance):
+    alone = next((n for n in posterior.nodes if not n.hypothesis.effects), None)
+    # the soil alone is likeliest outside its priors, without a discrepancy
+    other_soil = alone and alone.hypothesis.wide_priors and alone.share_without > 0.5
+    if other_soil and none > max(constants.UNCERTAIN, chance):
         return Decision("undecided", reasons=(soil_outside_priors(posterior),))
     hopeless = 1.0 - constants.UNCERTAIN if obstacles else 0.0
     if not ranked or (none > constants.UNCERTAIN and none > max(chance, hopeless)):
@@ -100,7 +103,11 @@ def decide(
     if none > constants.UNCERTAIN:
         return replace(suspected, reasons=(NOT_DECISIVE,))
     if chance >= constants.NAMED_PROBABILITY:
-        if unchecked := _unchecked_faults(posterior, best):
+        # an offset of one channel imitates what no catalogue has, such as a crust on the soil: a
+        # check of the sensor shows a fault, rows alone do not
+        problem = posterior.problem
+        faults = (n for n in best if problem.effects[n].about.kind in ("sensor", "rig"))
+        if unchecked := tuple(n for n in faults if n not in problem.calibration):
             return replace(suspected, reasons=(_reason("unchecked-fault", unchecked),))
         status = "named"
         if node.share_without < constants.LIKELIER:
@@ -112,12 +119,6 @@ def decide(
     if none <= constants.CHANCE and len(listed) > 1 and together >= constants.LIKELIER:
         return Decision("class", listed, listed, node)
     return replace(suspected, reasons=(NOT_DECISIVE,))
-
-
-def _is_other_soil(posterior: Posterior) -> bool:
-    """Whether the soil alone is likeliest outside its priors, without a discrepancy."""
-    alone = next((n for n in posterior.nodes if not n.hypothesis.effects), None)
-    return alone is not None and alone.hypothesis.wide_priors and alone.share_without > 0.5
 
 
 def pressed_priors(fit: Solution) -> dict[str, str]:
@@ -138,22 +139,19 @@ def opened_priors(posterior: Posterior) -> tuple[Remark, ...]:
         return ()
     if not best.effects:
         return (soil_outside_priors(posterior),)
-    pressed, why = _within_priors(posterior)
-    return (Remark("prior-opened", f"the priors of the soil were opened: {why}", pressed),)
+    opened = "prior-opened", "the priors of the soil were opened"
+    return (soil_outside_priors(posterior, *opened),)
 
 
-def soil_outside_priors(posterior: Posterior) -> Remark:
-    """That the soil alone explains the rows where its priors are opened."""
-    pressed, why = _within_priors(posterior)
-    text = f"a soil outside its priors explains the rows: {why}"
-    return Remark("soil-outside-priors", text, pressed)
-
-
-def _within_priors(posterior: Posterior) -> tuple[tuple[str, ...], str]:
-    """The soil parameters at ends of their priors, and what a fit within these is like."""
+def soil_outside_priors(
+    posterior: Posterior,
+    code: str = "soil-outside-priors",
+    text: str = "a soil outside its priors explains the rows",
+) -> Remark:
+    """That the rows are explained where the soil's priors are opened, and what is within them."""
     pressed = pressed_priors(posterior.soil.fit)
     why = f"within them, the fit has {'; '.join(pressed.values()) or 'a large remainder'}"
-    return tuple(pressed), why
+    return Remark(code, f"{text}: {why}", tuple(pressed))
 
 
 def _reason(code: str, names: Names) -> Remark:
@@ -163,7 +161,13 @@ def _reason(code: str, names: Names) -> Remark:
 def _doubt(posterior: Posterior, node: Explanation, gain: float) -> Remark | None:
     """Why an explanation is not claimed, whatever its probability is."""
     names = node.hypothesis.effects
-    if faults := implausible_faults(node.fit):
+    deviation = np.abs(node.fit.x) * np.sqrt(node.fit.precision)
+    faults = tuple(
+        c.effect
+        for c, d in zip(node.fit.coordinates, deviation, strict=True)
+        if c.effect and not c.is_shape and d > constants.MAX_SIZE_DEVIATION
+    )
+    if faults:
         return _reason("implausible-fault", faults)
     if implausible_sizes(node.fit):
         return _reason("implausible-size", names)
@@ -175,27 +179,6 @@ def _doubt(posterior: Posterior, node: Explanation, gain: float) -> Remark | Non
     if posterior.by_other_law(node.hypothesis):
         return _reason("other-law", names)
     return None
-
-
-def _unchecked_faults(posterior: Posterior, names: Names) -> tuple[str, ...]:
-    """The faults of sensors and rig among effects, of which no check says how large they can be.
-
-    An offset of one channel imitates what no catalogue has, such as a crust on the soil: rows alone
-    do not show a fault, a check of the sensor does.
-    """
-    problem = posterior.problem
-    kinds = {name: problem.effects[name].about.kind for name in names}
-    return tuple(n for n in names if kinds[n] in ("sensor", "rig") and n not in problem.calibration)
-
-
-def implausible_faults(fit: Solution) -> tuple[str, ...]:
-    """Faults of sensors and the rig that are far larger than their priors allow."""
-    deviation = np.abs(fit.x) * np.sqrt(fit.precision)
-    return tuple(
-        c.effect
-        for c, d in zip(fit.coordinates, deviation, strict=True)
-        if c.effect and not c.is_shape and d > constants.MAX_SIZE_DEVIATION
-    )
 
 
 def implausible_sizes(fit: Solution) -> dict[str, float]:

@@ -92,28 +92,23 @@ def whole_answer(posterior: Posterior, decision: Decision) -> Explanation | None
     return None
 
 
-def weighed_explanations(posterior: Posterior) -> list[tuple[float, Explanation]]:
-    """The likeliest explanations that together hold `constants.HELD`, with their probabilities."""
-    found: list[tuple[float, Explanation]] = []
-    for node in posterior.nodes[: constants.MOST_RETURNED]:
-        found.append((posterior.node_weight(node), node))
-        if sum(weight for weight, _ in found) >= constants.HELD:
-            break
-    return found
-
-
 def returned_case(posterior: Posterior, whole: Explanation | None, seed: int) -> Case:
     """What predicts: the case of the whole answer, else the mixture of all that is likely.
 
-    Of a mixture, the case itself has the mean soil and no effect; each explanation has its own.
-    The smooth remainder is that of the mixture.
+    The mixture is of the likeliest explanations that together hold `constants.HELD`. The case
+    itself has the mean soil and no effect; each explanation has its own. The smooth remainder is
+    that of the mixture.
     """
-    parts = [(1.0, whole)] if whole is not None else weighed_explanations(posterior)
+    parts = [] if whole is None else [(1.0, whole)]
+    for node in () if parts else posterior.nodes[: constants.MOST_RETURNED]:
+        parts.append((posterior.node_weight(node), node))
+        if sum(weight for weight, _ in parts) >= constants.HELD:
+            break
     left, learned = discrepancy_amplitudes(posterior, parts), learned_remainder(posterior, parts)
     if whole is not None:
         return updated_case(whole, left, learned)
     alone = updated_case(posterior.soil, left, learned)
-    mean = {p: round_significant(m.mean) for p, m in posterior.soil_marginals(seed).items()}
+    mean = {p: round_significant(m.value) for p, m in posterior.soil_marginals(seed).items()}
     each = tuple(CaseExplanation.of(round(w, 4), updated_case(node)) for w, node in parts)
     prior = dict(posterior.problem.case.prior)
     return replace(alone, prior=prior, explanations=each).with_values(mean)
@@ -123,15 +118,6 @@ def soil_before(fit: Solution) -> dict[str, EstimatedValue]:
     """The soil parameters of a fit of the soil alone, by name."""
     values, stds = fit.values(), fit.stds()
     return {c.name: EstimatedValue(values[c.path], stds[c.path], c.unit) for c in fit.coordinates}
-
-
-def soil_after(posterior: Posterior, seed: int) -> dict[str, EstimatedValue]:
-    """The soil by all explanations together, by name: marginals of the posterior."""
-    found = posterior.soil_marginals(seed, INTERVAL_FACTOR)
-    return {
-        path.rpartition(".")[2]: EstimatedValue(own.mean, own.std, own.unit)
-        for path, own in found.items()
-    }
 
 
 def variance_component_entries(posterior: Posterior) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.fitting.covariance import noise_of_operation
-from soilml.fitting.damped_descents import descend_each
+from soilml.fitting.damped_descents import descent_if_any
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.gap.results import BeforeAfter, GapReduction
+from soilml.inference.evidence import LinearisedFit
 from soilml.inference.explanation import Explanation
-from soilml.inference.gaussian_terms import scatter_columns, terms_like
+from soilml.inference.gaussian_terms import Hyperparameters, scatter_columns, terms_like
 from soilml.inference.posterior import Names, Posterior
 from soilml.inference.search import SOIL_STARTS
 from soilml.io.table import Table
@@ -140,20 +141,15 @@ def predicted_by_refits(
     Under noise and scatter alone; without equilibrium, or where the model refuses the fit, NaN.
     """
     readings = posterior.terms.readings
-    problems, starts, where = [], [], []
+    means = [{name: np.full(len(readings), np.nan) for name in parts} for _ in fits]
     for name, folds in parts.items():
         for number in folds.predicted:
             out = folds.fold == number
             whiten = posterior.terms.whiten(posterior.noise, posterior.outliers | out)
-            for i, fit in enumerate(fits):
-                problems.append(LeastSquaresProblem(fit.case, fit.coordinates, readings, whiten))
-                starts.append(fit)
-                where.append((i, name, out))
-    found = descend_each(problems, [f.x for f in starts], [f.linearisation for f in starts])
-    means = [{name: np.full(len(readings), np.nan) for name in parts} for _ in fits]
-    for (i, name, out), solved in zip(where, found, strict=True):
-        if not isinstance(solved, InputError):
-            means[i][name][out] = solved.prediction[out]
+            for fit, mean in zip(fits, means, strict=True):
+                problem = LeastSquaresProblem(fit.case, fit.coordinates, readings, whiten)
+                if (solved := descent_if_any(problem, fit.x, fit.linearisation)) is not None:
+                    mean[name][out] = solved.prediction[out]
     return means
 
 
@@ -167,18 +163,17 @@ def predictive_gains(posterior: Posterior, sets: Sequence[Names], seed: int) -> 
     parts = held_out_folds(posterior.terms.readings, seed)
     counted = [folds for part, folds in parts.items() if part != REGION or SLIPS not in parts]
 
-    def density(node: Explanation) -> float:
-        sums = [
-            sum(node.linear.log_density(node.at, folds.fold == k) for k in folds.predicted)
-            for folds in counted
-        ]
-        return float(np.mean(sums))
-
     known = {names: node for names in sets if (node := posterior.node_of(names)) is not None}
     if not counted or not known:
         return {}
-    alone = density(posterior.soil)
-    return {names: density(node) - alone for names, node in known.items()}
+    alone = log_score(posterior.soil.linear, posterior.soil.at, counted)
+    return {n: log_score(node.linear, node.at, counted) - alone for n, node in known.items()}
+
+
+def log_score(model: LinearisedFit, at: Hyperparameters, parts: Iterable[Folds]) -> float:
+    """Log density of rows kept back beside a remainder: mean over the parts."""
+    sums = [sum(model.log_density(at, own.fold == k) for k in own.predicted) for own in parts]
+    return float(np.mean(sums))
 
 
 def gap_reduction(
@@ -214,11 +209,9 @@ def plain_fits(posterior: Posterior, shown: Explanation | None) -> tuple[Solutio
 
     elsewhere = [np.asarray([c.prior.fraction(c.nominal) for c in soil.coordinates])]
     elsewhere += [np.full(len(soil.x), x) for x in SOIL_STARTS]
-    known = [soil.linearisation, *(None for _ in elsewhere)]
-    begun = descend_each([problem(soil)] * len(known), [soil.x, *elsewhere], known)
-    carried = [
-        f for f in begun if not isinstance(f, InputError) and np.isfinite(f.prediction).all()
-    ]
+    begun = [descent_if_any(problem(soil), soil.x, soil.linearisation)]
+    begun += [descent_if_any(problem(soil), start) for start in elsewhere]
+    carried = [f for f in begun if f is not None and np.isfinite(f.prediction).all()]
     stays = soil.whitened_by(posterior.whiten)
     alone = min(carried, key=lambda fit: fit.objective, default=stays)
     if shown is None or not shown.hypothesis.effects:
@@ -228,10 +221,9 @@ def plain_fits(posterior: Posterior, shown: Explanation | None) -> tuple[Solutio
         0.0 if c.effect else c.prior.fraction(values.get(c.path, c.nominal))
         for c in shown.fit.coordinates
     ]
-    starts = [shown.fit.x, np.asarray(absent)]
-    found = descend_each([own, own], starts, [shown.fit.linearisation, None])
-    solved = [fit for fit in found if not isinstance(fit, InputError)]
-    return alone, min([*solved, alone], key=lambda fit: fit.objective)
+    found = [descent_if_any(own, shown.fit.x, shown.fit.linearisation)]
+    found += [descent_if_any(own, np.asarray(absent)), alone]
+    return alone, min((fit for fit in found if fit is not None), key=lambda fit: fit.objective)
 
 
 def gap_reductions(

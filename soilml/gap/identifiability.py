@@ -80,7 +80,35 @@ class Audit(Result):
 
     def report(self) -> Report:
         """Which effects could be named."""
-        return audit_report(self)
+        effects, units = self.effects, [e.unit for e in self.effects]
+        named = [e.name for e in effects if e.nameable]
+        count = len(effects) + len(self.untestable)
+        table = ReportTable(
+            "Effects",
+            [
+                Column("effect", [e.name for e in effects]),
+                Column("nameable", [e.nameable for e in effects]),
+                Column("left", [e.residual_signal for e in effects], digits=3),
+                Column("apart", [e.separating_snr for e in effects], digits=3),
+                Column("size", [e.size for e in effects], units, digits=3),
+                Column("detectable", [e.detectable_size for e in effects], units,
+                       digits=2, sizes=[e.size for e in effects]),
+                Column("absorbed", [e.absorbed for e in effects], "share", digits=2),
+                Column("rival", [f"{e.rival} {e.cosine:.2f}" if e.rival else "" for e in effects]),
+            ],
+            "Signals in sigma at the reference size: left beside the soil, and apart from the "
+            "most similar effect. Absorbed: the share that the soil imitates.",
+        )  # fmt: skip
+        untested = [f"{name}: {why}" for name, why in self.untestable.items()]
+        return Report(
+            kind="plan",
+            verdict=f"These runs could name {len(named)} of {count} effects.",
+            lines=[f"They could name: {', '.join(named)}."] if named else [],
+            tables=[table] if effects else [],
+            details=[("Effects that cannot be tested", untested)] if untested else [],
+            status=f"{len(named)} of {count}",
+            title="Effects that a design could name",
+        )
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each effect: size and unit, signals in sigma, and whether it could be named."""
@@ -180,7 +208,6 @@ def planned_readings(case: Case, design: Table) -> Readings:
         names,
         measured=np.concatenate([expected[column(n)] for n in names]),
         std=np.concatenate([stds[n] for n in names]),
-        noise=[case.noise.get(column(n)) for n in names],
         run=number.astype(np.int64),
         runs=[str(r) for r in runs],
     )
@@ -232,36 +259,3 @@ def similarity(columns: Mapping[str, Floats], space: Floats) -> tuple[Floats, Fl
     cosine = np.abs(unit.T @ unit)
     np.fill_diagonal(cosine, 0.0)
     return norm, cosine
-
-
-def audit_report(found: Audit) -> Report:
-    """The report of an audit: which effects could be named."""
-    effects, units = found.effects, [e.unit for e in found.effects]
-    named = [e.name for e in effects if e.nameable]
-    count = len(effects) + len(found.untestable)
-    table = ReportTable(
-        "Effects",
-        [
-            Column("effect", [e.name for e in effects]),
-            Column("nameable", [e.nameable for e in effects]),
-            Column("left", [e.residual_signal for e in effects], digits=3),
-            Column("apart", [e.separating_snr for e in effects], digits=3),
-            Column("size", [e.size for e in effects], units, digits=3),
-            Column("detectable", [e.detectable_size for e in effects], units,
-                   digits=2, sizes=[e.size for e in effects]),
-            Column("absorbed", [e.absorbed for e in effects], "share", digits=2),
-            Column("rival", [f"{e.rival} {e.cosine:.2f}" if e.rival else "" for e in effects]),
-        ],
-        "Signals in sigma at the reference size: left beside the soil, and apart from the "
-        "most similar effect. Absorbed: the share that the soil imitates.",
-    )  # fmt: skip
-    untested = [f"{name}: {why}" for name, why in found.untestable.items()]
-    return Report(
-        kind="plan",
-        verdict=f"These runs could name {len(named)} of {count} effects.",
-        lines=[f"They could name: {', '.join(named)}."] if named else [],
-        tables=[table] if effects else [],
-        details=[("Effects that cannot be tested", untested)] if untested else [],
-        status=f"{len(named)} of {count}",
-        title="Effects that a design could name",
-    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -41,14 +41,8 @@ Difference = tuple[Floats, Floats]
 Rows = tuple[dict[str, float | str], ...]
 
 
-@dataclass(frozen=True)
-class _Proposal:
-    """A run or check: what it is, its rows, and how each rival differs on them from the first."""
-
-    kind: str
-    text: str
-    rows: Rows
-    differences: Sequence[Difference]
+#: Kind, text and rows of a run or check, and how each rival differs on them from the first.
+_Proposal = tuple[str, str, Rows, Sequence[Difference]]
 
 
 def competing_explanations(
@@ -84,17 +78,18 @@ def next_runs(posterior: Posterior, explanations: Sequence[Explanation]) -> list
     ]
     sets = tuple(dict.fromkeys(node.hypothesis.effects for node in compared))
     found = []
-    for one in (*_runs(posterior, fits), *_checks(fits)):
+    for kind, text, rows, differences in (*_runs(posterior, fits), *_checks(fits)):
         try:
-            sigmas = [
-                _discrimination(rival, old, new)
-                for rival, old, new in zip(rivals, present, one.differences, strict=True)
+            increases = [
+                _adapted_misfit(rival, [old, new]) - _adapted_misfit(rival, [old])
+                for rival, old, new in zip(rivals, present, differences, strict=True)
             ]
         except np.linalg.LinAlgError:
             continue
+        sigmas = np.sqrt(np.maximum(increases, 0.0))
         size = float(np.mean(np.minimum(sigmas, MAX_DISCRIMINATION)))
         if size >= MIN_DISCRIMINATION:  # that of a rival without an equilibrium is NaN
-            found.append(NextRun(one.kind, one.text, size, one.rows, sets))
+            found.append(NextRun(kind, text, size, rows, sets))
     return sorted(found, key=lambda run: -run.discrimination)[:LISTED]
 
 
@@ -123,7 +118,7 @@ def _runs(posterior: Posterior, fits: Mapping[str, Solution]) -> Iterator[_Propo
             continue
         differences = [_difference(whiten, here[0], line) for line in here[1:]]
         predicted = {name: line.prediction for name, line in zip(fits, here, strict=True)}
-        yield _Proposal(option.kind, option.text, _rows_of_run(readings, predicted), differences)
+        yield option.kind, option.text, _rows_of_run(readings, predicted), differences
 
 
 def _linearised(at: Operating, fit: Solution, channels: Sequence[str]) -> Linearisation:
@@ -136,14 +131,13 @@ def _readings_like(at: Operating, case: Case, like: Readings, measured: Floats) 
     """Measured values (m,) of a run, with the noise of known readings, else that of the case."""
     stds = []
     for i, own in enumerate(np.split(measured, len(like.channels))):
-        noise = like.noise[i] or case.noise.get(column(like.channels[i]))
+        noise = case.noise.get(column(like.channels[i]))
         typical = np.full(own.shape, np.median(like.std[like.channel == i]))
         stds.append(np.maximum(typical if noise is None else noise.std(own), 1e-12))
     return replace(
         Readings.of_every_row(with_default_covariates(at, case), like.channels),
         measured=measured,
         std=np.concatenate(stds),
-        noise=like.noise,
         runs=("next",),
     )
 
@@ -181,7 +175,7 @@ def _checks(fits: Mapping[str, Solution]) -> Iterator[_Proposal]:
                 if path in own
             }
             differences = [_difference_of_parameters(first, rival, free) for rival in rivals]
-            yield _Proposal(kind, text, (row,), differences)
+            yield kind, text, (row,), differences
 
 
 def _difference_of_parameters(
@@ -207,12 +201,6 @@ def _value(fit: Solution, path: str) -> float:
     known = fit.case.parameters()
     fixed = float(known[path][1]) if path in known else 0.0
     return fit.values().get(path, fixed)
-
-
-def _discrimination(rival: Solution, present: Difference, new: Difference) -> float:
-    """Sigma that new rows add between an explanation and a rival adapted to all rows."""
-    increase = _adapted_misfit(rival, [present, new]) - _adapted_misfit(rival, [present])
-    return float(np.sqrt(np.maximum(increase, 0.0)))
 
 
 def _adapted_misfit(rival: Solution, parts: Sequence[Difference]) -> float:

@@ -105,7 +105,7 @@ def _large_noise(posterior: Posterior, soil: Solution) -> Iterator[Remark]:
 def one_channel(posterior: Posterior) -> Iterator[Remark]:
     """Of one channel: the effects that would change others alone."""
     channels = posterior.terms.readings.channels
-    hidden = [name for name, why in posterior.untestable.items() if why.code == "no-change"]
+    hidden = [name for name, why in posterior.search.untestable.items() if why.code == "no-change"]
     if len(channels) == 1 and hidden:
         measured = channel_name(column(channels[0]))
         text = f"only {measured} was measured: {', '.join(hidden)} would not show"
@@ -138,7 +138,7 @@ def like_another_soil(posterior: Posterior, soil: Solution) -> list[Remark]:
     Econometric Analysis, 7th ed., section 4.3.2.
     """
     soil, alike = soil.whitened_by(posterior.whiten), []
-    for s in posterior.signatures:
+    for s in posterior.search.signatures.get((), []):
         whole = np.asarray(posterior.whiten @ s.column)
         change = np.linalg.solve(soil.information, soil.jacobian.T @ whole)
         left = float(np.linalg.norm(whole - soil.jacobian @ change))

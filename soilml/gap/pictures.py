@@ -98,7 +98,7 @@ def _draw_bars(gap: Mapping[str, GapReduction], parts: Mapping[str, str], axes: 
         names = ["all readings", *map(channel_name, part.channels)]
         shown = [pair if part.shrinks else (pair[0], math.nan) for pair in pairs]
         draw_bars(panel, dict(zip(names, shown, strict=True)), values)
-        panel.set_title(parts.get(key, key.replace("_", " ")))
+        panel.set_title(parts.get(key, key))
 
 
 def draw_bars(panel: Any, rows: Mapping[str, tuple[float, float]], values: Sequence[float]) -> None:

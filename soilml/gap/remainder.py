@@ -218,9 +218,7 @@ def _blank_parts(
     terms, case, found = posterior.terms, posterior.problem.case, []
     readings = terms.readings
     gears = list(case.gears) or [""]
-    driven = np.broadcast_to(
-        np.asarray(gears[0] if readings.at.gear is None else readings.at.gear), len(readings.run)
-    )[readings.row]
+    driven = readings.driven_by(gears[0])
     for i, name in enumerate(readings.channels):
         if amplitude[i] < LEAST_AMPLITUDE or terms.usual[i] == 0.0:
             continue

@@ -110,8 +110,16 @@ def _tables(found: GapReport) -> Iterator[ReportTable]:
             ],
             "Distances in standard deviations of what such tests scatter from place to place.",
         )
-    if found.variance_components:
-        yield _components(found)
+    if entries := found.variance_components:
+        size = ["rad" if name == "friction_angle_std" else "1" for name in entries]
+        yield ReportTable(
+            "Estimated variation",
+            [
+                Column("quantity", [name.replace("_", " ") for name in entries]),
+                Column("size", list(entries.values()), size, digits=2),
+            ],
+            "It is part of the noise throughout this report.",
+        )
 
 
 def _suspects(found: GapReport) -> ReportTable:
@@ -135,13 +143,7 @@ def _suspects(found: GapReport) -> ReportTable:
 def _sizes(found: GapReport) -> ReportTable:
     """Mean squared residuals by part of the rows and channel, before and after."""
     rows = [
-        (
-            PARTS.get(key, key.replace("_", " ")),
-            name,
-            before,
-            after if part.shrinks else np.nan,
-            part,
-        )
+        (PARTS.get(key, key), name, before, after if part.shrinks else np.nan, part)
         for key, part in found.gap.items()
         for name, (before, after) in (
             ("all readings", (part.before, part.after)),
@@ -191,18 +193,6 @@ def _next_runs(found: GapReport) -> ReportTable:
     apart = f" of {first} from {', '.join(others)}" if others else ""
     note = f"Expected discrimination{apart}, at most 10 stated; above 3 sigma a run decides."
     return ReportTable("Next runs", columns, note)
-
-
-def _components(found: GapReport) -> ReportTable:
-    entries = found.variance_components
-    units = ["rad" if name == "friction_angle_std" else "1" for name in entries]
-    columns = [
-        Column("quantity", [name.replace("_", " ") for name in entries]),
-        Column("size", list(entries.values()), units, digits=2),
-    ]
-    return ReportTable(
-        "Estimated variation", columns, "It is part of the noise throughout this report."
-    )
 
 
 def _pictures(found: GapReport) -> Iterator[Picture]:

@@ -26,7 +26,6 @@ from soilml.gap.disagreements import disagreements
 from soilml.gap.estimates import (
     named_effects,
     returned_case,
-    soil_after,
     soil_before,
     variance_component_entries,
     whole_answer,
@@ -243,6 +242,7 @@ def _build_report(
     figures, not_reduced = without_grown(figures, added)
     whole = whole_answer(posterior, decision)
     claimed = bool(decision.claimed)
+    after = posterior.soil_marginals(seed, constants.INTERVAL_FACTOR)
     report = GapReport(
         status=decision.status,
         sentence="",
@@ -253,8 +253,8 @@ def _build_report(
         reasons=decision.reasons,
         gap=figures,
         soil_before=soil_before(alone),
-        soil_after=soil_after(posterior, seed),
-        untestable=dict(posterior.untestable),
+        soil_after={path.rpartition(".")[2]: own for path, own in after.items()},
+        untestable=dict(posterior.search.untestable),
         notes=(
             *notes,
             *not_reduced,

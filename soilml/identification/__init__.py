@@ -43,6 +43,10 @@ METHODS: dict[str, Method] = {
 }
 #: Methods that need the closed form of a rigid wheel with linear stresses.
 CLOSED_FORM = ("linear", "newton")
+TEST_DISAGREES = (
+    "the rows disagree with a test of the soil: {}; an effect may be missing from the model, or "
+    "the test was made on another soil"
+)
 
 
 @solvable("the identification")
@@ -119,10 +123,12 @@ def identify(
         fit = METHODS[method](case, readings, selected)
     if method not in CLOSED_FORM and fit.low is None:
         fit = _within_priors(fit, selected)
+    found = dict(zip(fit.names, fit.values, strict=True))
+    tests = [] if method in CLOSED_FORM else disagreeing_soil_tests(case, found)
     remarks = [
         *([SAME_ROWS] if case.remainder is not learned else []),
         *_ignored(case, fit, readings),
-        *_disagreeing_tests(case, fit),
+        *(Remark("soil-test-disagrees", TEST_DISAGREES.format(text)) for text in tests),
         *readings.notes,
     ]
     shown = (
@@ -152,18 +158,6 @@ def _ignored(case: Case, fit: Fit, readings: Readings) -> list[Remark]:
     ignored += ["noise of slip and load"] if noisy else []
     text = f"the {fit.method} method ignores {', '.join(ignored)}: its intervals are too narrow"
     return [Remark("ignored-setting", text)] if ignored else []
-
-
-def _disagreeing_tests(case: Case, fit: Fit) -> list[Remark]:
-    """Tests of the soil that the rows disagree with."""
-    values = dict(zip(fit.names, fit.values, strict=True))
-    text = (
-        "the rows disagree with a test of the soil: {}; an effect may be missing from the model, "
-        "or the test was made on another soil"
-    )
-    closed = fit.method in CLOSED_FORM
-    found = [] if closed else disagreeing_soil_tests(case, values)
-    return [Remark("soil-test-disagrees", text.format(one)) for one in found]
 
 
 __all__ = ["METHODS", "Fit", "identify"]

@@ -26,7 +26,7 @@ from soilml.identification.posterior import (
 )
 from soilml.inference import constants
 from soilml.inference.draws import Draws
-from soilml.inference.posterior import Posterior, infer
+from soilml.inference.posterior import infer
 from soilml.inference.problem import InferenceProblem
 from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.physics.effects import EFFECTS
@@ -79,11 +79,11 @@ def averaged_samples(
 ) -> PosteriorSamples:
     """Weighted samples of the soil over all explanations of the rows; see `averaged`."""
     optimum = fit_under_declared_noise(case, readings, free)
-    misfit = Misfit.of(optimum, readings, len(free))
+    misfit = Misfit.of(optimum)
     if readings.undeclared:
-        std = np.where(np.isfinite(readings.std), readings.std, optimum.problem.readings.std)
-        known = readings.from_case & np.isfinite(readings.std)
-        readings = replace(readings, std=std, from_case=known)
+        std, unknown = optimum.problem.readings.std, ~np.isfinite(readings.std)
+        names = [readings.channels[i] for i in readings.channel[unknown]]
+        readings = readings.with_default_std(dict(zip(names, std[unknown], strict=True)))
     problem = InferenceProblem.of(case, readings, free, candidate_effects(case, EFFECTS))
     try:
         found = infer(problem)
@@ -99,7 +99,13 @@ def averaged_samples(
     )
     weights = weights if weights.sum() > 0.0 else np.ones_like(weights)
     sample = ImportanceSample(u, weights / weights.sum(), 0.0)
-    return PosteriorSamples(sample, misfit.per_freedom, rejected, explanations=_explanations(found))
+    shares: dict[tuple[tuple[str, ...], bool], float] = {}
+    for one in found.components():
+        key = one.node.hypothesis.effects, one.at.present
+        shares[key] = shares.get(key, 0.0) + one.weight
+    stated = (SoilExplanation(*key, share) for key, share in shares.items())
+    explained = tuple(sorted(stated, key=lambda one: -one.probability))
+    return PosteriorSamples(sample, misfit.per_freedom, rejected, explanations=explained)
 
 
 def soil_samples(
@@ -128,13 +134,3 @@ def _fractions(own: Draws, free: Sequence[Coordinate]) -> tuple[Floats, Floats]:
     )
     inside = ((u > 0.0) & (u < 1.0)).all(axis=1)
     return u, own.weight * inside
-
-
-def _explanations(found: Posterior) -> tuple[SoilExplanation, ...]:
-    """Sets of effects, with and without further errors of the model, the likeliest first."""
-    shares: dict[tuple[tuple[str, ...], bool], float] = {}
-    for one in found.components():
-        key = one.node.hypothesis.effects, one.at.present
-        shares[key] = shares.get(key, 0.0) + one.weight
-    stated = (SoilExplanation(*key, share) for key, share in shares.items())
-    return tuple(sorted(stated, key=lambda one: -one.probability))

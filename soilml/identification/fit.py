@@ -231,11 +231,17 @@ class Fit(Result):
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml identify` writes."""
-        correlation = self.correlation
+        correlation, remaining = self.correlation, self.remaining_fraction
+        rows = zip(self.names, self.values, self.std, *self.interval, self.units, strict=True)
         content = {
             "verdict": self.verdict,
             "method": self.method,
-            "parameters": self._parameters(),
+            "parameters": {
+                name: {"value": float(v), "std": float(s), "p05": float(low), "p95": float(high)}
+                | {"unit": unit}
+                | ({"remaining_fraction": remaining[name]} if name in remaining else {})
+                for name, v, s, low, high, unit in rows
+            },
             "correlation": {
                 a: {b: float(correlation[i, j]) for j, b in enumerate(self.names) if j != i}
                 for i, a in enumerate(self.names)
@@ -248,17 +254,6 @@ class Fit(Result):
         if self.explanations:
             content["explanations"] = [one.as_json() for one in self.explanations]
         return content
-
-    def _parameters(self) -> dict[str, Any]:
-        """Each parameter with its value, standard deviation and interval."""
-        rows = zip(self.names, self.values, self.std, *self.interval, self.units, strict=True)
-        remaining = self.remaining_fraction
-        return {
-            name: {"value": float(v), "std": float(s), "p05": float(low), "p95": float(high)}
-            | {"unit": unit}
-            | ({"remaining_fraction": remaining[name]} if name in remaining else {})
-            for name, v, s, low, high, unit in rows
-        }
 
 
 #: Deviation from a test of the soil, in standard deviations of its scatter, that is remarked on.
@@ -352,11 +347,3 @@ def disagreeing_soil_tests(case: Case, values: Mapping[str, float]) -> list[str]
         for test, z in zip(case.soil_tests, each, strict=True)
         if abs(z) > NOTABLE
     ]
-
-
-def ignored_soil_tests(case: Case) -> list[Remark]:
-    """A remark that a file for the board ignores the case's tests; none for a case without."""
-    if not case.soil_tests:
-        return []
-    text = "[[soil.test]] is ignored: a file for the board takes no tests of the soil"
-    return [Remark("soil-tests-ignored", text)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -65,28 +65,16 @@ def linear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     return with_fixed_parameter(case, "shear_modulus", lambda c: _solve(c, readings, free))
 
 
-@dataclass(frozen=True)
-class _Rows:
-    """Rows (n,) with torque and sinkage under driving slip; noise is NaN where not declared."""
-
-    slip: Floats
-    load: Floats
-    torque: Floats
-    sinkage: Floats
-    torque_std: Floats
-    sinkage_std: Floats
-
-    @property
-    def noise_declared(self) -> bool:
-        return bool(np.isfinite(self.torque_std).all() and np.isfinite(self.sinkage_std).all())
-
-
 def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
-    rows = _usable_rows(case, readings)
-    declared = rows.noise_declared
-    if not declared and len(rows.slip) == 2:
+    slip, load, *measured = _usable_rows(case, readings)
+    declared = bool(np.isfinite(measured[2:]).all())
+    if not declared and len(slip) == 2:
         raise FitError("two rows leave no residual to estimate the noise: declare it in [noise]")
-    solution, matrix, right, weight = _iterate(case, rows)
+
+    def system(torque: Floats, sinkage: Floats, cohesion: float) -> tuple[Floats, Floats]:
+        return _equations(case, slip, load, torque, sinkage, cohesion)
+
+    solution, matrix, right, weight = _iterate(system, *measured, declared=declared)
     residual = (right - matrix @ solution) * weight
     misfit, noise_variance = misfit_and_variance(residual, 2, declared)
     weighted = matrix * weight[:, None]
@@ -102,14 +90,18 @@ def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
         units=("Pa", "rad"),
         values=np.asarray([solution[0], angle]),
         covariance=covariance * np.outer(rate, rate),
-        warnings=tuple(_limits(case, free, solution, rows.load)),
-        rows_used=len(rows.slip),
+        warnings=tuple(_limits(case, free, solution, load)),
+        rows_used=len(slip),
         misfit=misfit if declared else float("nan"),
         channels=("torque_Nm", "sinkage_m"),
     )
 
 
-def _usable_rows(case: Case, readings: Readings) -> _Rows:
+def _usable_rows(case: Case, readings: Readings) -> Floats:
+    """Slip, load, torque and sinkage under driving slip, noise of these, (6, n).
+
+    Noise is NaN where it is not declared.
+    """
     (torque, torque_std), (sinkage, sinkage_std) = (
         _of_rows(readings, name) for name in ("torque", "sinkage")
     )
@@ -123,32 +115,34 @@ def _usable_rows(case: Case, readings: Readings) -> _Rows:
             "needs two at different loads or slips"
         )
     columns = slip, readings.row_load, torque, sinkage, torque_std, sinkage_std
-    return _Rows(*(values[usable] for values in columns))
+    return np.stack(columns)[:, usable]
 
 
-def _iterate(case: Case, rows: _Rows) -> tuple[Floats, Floats, Floats, Floats]:
+def _iterate(
+    system: Callable[[Floats, Floats, float], tuple[Floats, Floats]],
+    torque: Floats,
+    sinkage: Floats,
+    torque_std: Floats,
+    sinkage_std: Floats,
+    *,
+    declared: bool,
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Solution (2,), matrix (n, 2), right-hand side (n,) and weights (n,) at the fixed point.
 
     Weights are the inverse standard deviations of the residuals by propagation of the noise.
     """
-
-    def system(torque: Floats, sinkage: Floats, cohesion: float) -> tuple[Floats, Floats]:
-        return _equations(case, rows.slip, rows.load, torque, sinkage, cohesion)
-
-    weight: Floats = np.ones_like(rows.torque)
+    weight: Floats = np.ones_like(torque)
     solution: Floats = np.zeros(2)
     for _ in range(ITERATIONS):
-        matrix, right = system(rows.torque, rows.sinkage, solution[0])
+        matrix, right = system(torque, sinkage, solution[0])
         before = solution
-        solution = np.asarray(
-            np.linalg.lstsq(matrix * weight[:, None], right * weight, rcond=None)[0],
-            dtype=np.float64,
-        )
-        if rows.noise_declared:
+        found = np.linalg.lstsq(matrix * weight[:, None], right * weight, rcond=None)[0]
+        solution = np.asarray(found, dtype=np.float64)
+        if declared:
             residual = right - matrix @ solution
             moved = [
-                system(rows.torque + rows.torque_std, rows.sinkage, solution[0]),
-                system(rows.torque, rows.sinkage + rows.sinkage_std, solution[0]),
+                system(torque + torque_std, sinkage, solution[0]),
+                system(torque, sinkage + sinkage_std, solution[0]),
             ]
             change = [(b - m @ solution) - residual for m, b in moved]
             weight = 1.0 / np.sqrt(change[0] ** 2 + change[1] ** 2)

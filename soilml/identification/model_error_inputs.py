@@ -25,12 +25,6 @@ def with_exact_model(estimator: Estimator) -> Estimator:
     return estimator.on(model_error=0.0)
 
 
-def with_stated_model_error(estimator: Estimator, case: Case) -> Estimator:
-    """The estimator for a case: one that states the errors of its model has no others."""
-    stated = bool(case.discrepancy) or case.remainder is not None
-    return with_exact_model(estimator) if stated else estimator
-
-
 def readings_with_model_error(
     estimator: Estimator, readings: Mapping[str, Any], case: Case | None, *, together: bool
 ) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate, rates_at, values_at
@@ -23,7 +22,6 @@ from soilml.identification.linear import (
 )
 from soilml.numerics.prior import Prior
 from soilml.physics.gears import LinearWheel
-from soilml.physics.soils import Soil
 from soilml.quantities import column
 from soilml.remarks import Remark
 
@@ -69,13 +67,18 @@ def newton(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
 
 
 def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
-    unknowns = _unknowns(case.soil)
+    soil = case.soil
+    unknowns = [  # with search ranges wider than any soil; kphi includes kc / b
+        Coordinate("friction_angle", "rad", Prior(0.02, 1.3), float(soil.friction_angle)),
+        Coordinate("shear_modulus", "m", Prior(1e-4, 1.0, log=True), float(soil.shear_modulus)),
+        Coordinate("kphi", "N/m^(n+2)", Prior(1e3, 1e9, log=True), float(soil.kphi)),
+    ]
     measured, declared = readings.measured, readings.std
     known = not readings.undeclared
     std = np.where(np.isfinite(declared), declared, ASSUMED_NOISE * np.abs(measured) + 1e-9)
 
     start = np.asarray([f.prior.fraction(f.nominal) for f in unknowns])
-    whiten = Whitening.of(std, np.zeros((len(std), 0)))
+    whiten = Whitening.beside(1.0 / std, np.zeros((len(std), 0)))
     found = descend(LeastSquaresProblem(case, unknowns, readings, whiten), start, EXACT)
     u = found.x
     if not np.isfinite(found.prediction).all():
@@ -85,7 +88,12 @@ def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
             "Newton-Raphson does not converge: the rows do not determine friction angle, shear "
             "modulus and pressure-sinkage modulus together; use --method nonlinear"
         )
-    _check_rank(found.jacobian)
+    singular = np.linalg.svd(found.jacobian, compute_uv=False)
+    if len(singular) < 3 or singular[-1] < LEAST_RATIO * singular[0]:
+        raise FitError(
+            "the rows are too similar for Newton-Raphson: give three or more at different slips "
+            "and loads, or use --method nonlinear"
+        )
     misfit, variance = misfit_and_variance(found.residual, len(unknowns), known)
     inverse = np.linalg.pinv(found.jacobian.T @ found.jacobian, rcond=1e-14)
     values, rate = values_at(unknowns, u), rates_at(unknowns, u)
@@ -107,21 +115,3 @@ def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
         misfit=misfit if known else float("nan"),
         channels=tuple(column(name) for name in readings.channels),
     )
-
-
-def _unknowns(soil: Soil) -> list[Coordinate]:
-    """The three unknowns with search ranges wider than any soil; kphi includes kc / b."""
-    return [
-        Coordinate("friction_angle", "rad", Prior(0.02, 1.3), float(soil.friction_angle)),
-        Coordinate("shear_modulus", "m", Prior(1e-4, 1.0, log=True), float(soil.shear_modulus)),
-        Coordinate("kphi", "N/m^(n+2)", Prior(1e3, 1e9, log=True), float(soil.kphi)),
-    ]
-
-
-def _check_rank(jacobian: Floats) -> None:
-    singular = np.linalg.svd(jacobian, compute_uv=False)
-    if len(singular) < 3 or singular[-1] < LEAST_RATIO * singular[0]:
-        raise FitError(
-            "the rows are too similar for Newton-Raphson: give three or more at different slips "
-            "and loads, or use --method nonlinear"
-        )

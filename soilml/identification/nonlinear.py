@@ -73,7 +73,7 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
         problem = replace(optimum.problem, priors="all")
         with_prior = descend(problem, optimum.x, EXACT, optimum.linearisation)
     x = optimum.x
-    found = Misfit.of(optimum, readings, len(free))
+    found = Misfit.of(optimum)
     excess = not undeclared and found.exceeds_noise
     of_prior = np.asarray([c.fraction_precision for c in free])
     of_tests = optimum.soil_tests.rates(x)
@@ -84,7 +84,7 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
         for at in (optimum, with_prior)
     )
     linear_std = np.sqrt(np.diag(linearised))
-    uniform = np.where(np.isinf(optimum.problem.terms.normal_std), of_prior, 0.0)
+    uniform = np.where(np.isinf(optimum.problem.normal_std), of_prior, 0.0)
     to_posterior_mean = linearised @ (uniform * (0.5 - x))
     total = np.maximum(
         np.hypot(linear_std, to_posterior_mean),

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -123,13 +122,16 @@ def fit_of_samples(
     covariance = (deviation.T * sample.weights) @ deviation
     low, high = sample.quantiles(values, INTERVAL)
     mean_u = np.asarray([f.prior.fraction(float(m)) for f, m in zip(free, mean, strict=True)])
+    size = sample.effective_size
+    few = f"the effective sample size is {size:.0f} only: sampling error of the values is about "
+    few += f"{100 / np.sqrt(size):.0f} % of their std"
     fit = Fit(
         method=method,
         names=tuple(f.path for f in free),
         units=tuple(f.unit for f in free),
         values=mean,
         covariance=covariance,
-        warnings=_sampling_warnings(sample),
+        warnings=(Remark("few-samples", few),) if size < FEW_SAMPLES else (),
         rows_used=readings.row_count,
         remaining_fraction={
             f.path: float(np.sqrt(covariance[i, i]) / f.prior.std) for i, f in enumerate(free)
@@ -154,7 +156,7 @@ def posterior_samples(
     """
     check_declared(readings)
     optimum = fit_under_declared_noise(case, readings, free)
-    found = Misfit.of(optimum, readings, len(free))
+    found = Misfit.of(optimum)
     scale = found.factor if found.exceeds_noise else 1.0
     sample = sample_posterior(optimum, scale)
     return PosteriorSamples(sample, found.per_freedom, found.exceeds_noise, scale)
@@ -168,15 +170,18 @@ def sample_posterior(optimum: Solution, noise_scale: float = 1.0) -> ImportanceS
     Raises `FitError` as `posterior` does.
     """
     problem, p = optimum.problem, len(optimum.x)
-    density = PosteriorDensity(problem, optimum.x, noise_scale)
+    density = posterior_density(problem, optimum.x, noise_scale)
     if len(problem.readings) < FEW_READINGS:
         sample = importance_sample(density, p, most_samples=MOST_SAMPLES)
     else:
         best = descend(replace(problem, priors="all"), optimum.x, EXACT, optimum.linearisation)
+        rates = best.soil_tests.rates(best.x)
+        precision = best.jacobian.T @ best.jacobian / noise_scale**2 + rates.T @ rates
+        precision += np.diag([c.fraction_precision for c in best.coordinates])
         sample = importance_sample(
             density,
             p,
-            around=(best.x, WIDER * _normal_root(best, noise_scale)),
+            around=(best.x, WIDER * np.linalg.cholesky(np.linalg.inv(precision))),
             least_effective_size=ENOUGH,
             most_samples=MOST_SAMPLES,
             later=ROUND,
@@ -192,57 +197,36 @@ def sample_posterior(optimum: Solution, noise_scale: float = 1.0) -> ImportanceS
     return sample
 
 
-def _normal_root(at: Solution, noise_scale: float) -> Floats:
-    """A root (p, p) of the covariance of the linearised posterior, in fractions of the priors."""
-    rates = at.soil_tests.rates(at.x)
-    precision = at.jacobian.T @ at.jacobian / noise_scale**2 + rates.T @ rates
-    precision += np.diag([c.fraction_precision for c in at.coordinates])
-    return np.linalg.cholesky(np.linalg.inv(precision))
+def posterior_density(
+    problem: LeastSquaresProblem, optimum: Floats, noise_scale: float = 1.0
+) -> Callable[[Floats], Floats]:
+    """Log posterior density (sets,), up to a constant, of fractions u (sets, p) of the priors.
 
-
-@dataclass(frozen=True)
-class PosteriorDensity:
-    """Log posterior density, up to a constant, of fractions of the priors.
-
-    Model discrepancy and errors that all rows share are integrated out, linearised at the optimum;
-    so is noise of slip and load.
+    It is -inf without an equilibrium. Model discrepancy and errors that all rows share are
+    integrated out, linearised at the optimum; so is noise of slip and load.
 
     problem: Readings with the noise that they have at the optimum, and the case.
     optimum (p,): Fractions of the priors at the optimum.
     noise_scale: Factor on all noise: above 1 where residuals exceed all that is declared.
     """
+    readings, names = problem.readings, [c.path for c in problem.coordinates]
+    values = map(float, values_at(problem.coordinates, optimum))
+    soil = problem.case.with_values(dict(zip(names, values, strict=True)))
+    operation, columns = noise_of_operation(soil, readings), columns_of_errors(soil, readings)
 
-    problem: LeastSquaresProblem
-    optimum: Floats
-    noise_scale: float = 1.0
-
-    @cached_property
-    def _linearised(self) -> tuple[Floats, Floats]:
-        """Standard deviation (m,) by noise of slip and load, and columns (m, q) of other errors."""
-        own = self.problem
-        names = [c.path for c in own.coordinates]
-        values = map(float, values_at(own.coordinates, self.optimum))
-        soil = own.case.with_values(dict(zip(names, values, strict=True)))
-        operation = noise_of_operation(soil, own.readings)
-        return operation, columns_of_errors(soil, own.readings)
-
-    def __call__(self, u: Floats) -> Floats:
-        """Log density (sets,) of parameter sets u (sets, p); -inf without an equilibrium."""
-        size = max(MOST_EVALUATIONS // len(self.problem.readings.row_slip), 1)
-        parts = [self._of(u[i : i + size]) for i in range(0, len(u), size)]
-        return np.concatenate(parts) if parts else np.zeros(0)
-
-    def _of(self, u: Floats) -> Floats:
-        own, (operation, columns) = self.problem, self._linearised
-        y = own.predict(u)
-        std = np.hypot(own.readings.noise_at(y), operation)
+    def of(u: Floats) -> Floats:
+        y = problem.predict(u)
+        std = np.hypot(readings.noise_at(y), operation)
         squares, log_determinant = squared_residuals_and_log_determinant(
-            y - own.readings.measured, std, columns
+            y - readings.measured, std, columns
         )
         # the factor on all noise enters the determinant as a constant, which does not matter
-        logs = -0.5 * squares / self.noise_scale**2 - log_determinant
-        logs -= 0.5 * (own.soil_tests.deviation(u) ** 2).sum(axis=1)
+        logs = -0.5 * squares / noise_scale**2 - log_determinant
+        logs -= 0.5 * (problem.soil_tests.deviation(u) ** 2).sum(axis=1)
         return np.where(np.isfinite(logs), logs, -np.inf)
+
+    size = max(MOST_EVALUATIONS // readings.row_count, 1)
+    return lambda u: np.concatenate([of(u[i : i + size]) for i in range(0, len(u), size)])
 
 
 def check_declared(readings: Readings) -> None:
@@ -253,14 +237,6 @@ def check_declared(readings: Readings) -> None:
             f"the posterior method needs the noise of {', '.join(undeclared)}: declare it in "
             f"[noise] of the model file, such as {lines}"
         )
-
-
-def _sampling_warnings(sample: ImportanceSample) -> tuple[Remark, ...]:
-    size = sample.effective_size
-    if size >= FEW_SAMPLES:
-        return ()
-    text = f"the effective sample size is {size:.0f} only: sampling error of the values is about "
-    return (Remark("few-samples", f"{text}{100 / np.sqrt(size):.0f} % of their std"),)
 
 
 def prior_fractions(

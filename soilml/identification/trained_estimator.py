@@ -22,14 +22,11 @@ from soilml.config.compatibility import (
 from soilml.config.measurement_noise import common_errors
 from soilml.errors import InputError, TableError
 from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS
-from soilml.identification.fit import ignored_soil_tests
 from soilml.identification.model_error_inputs import (
     model_error_remarks,
     with_exact_model,
-    with_stated_model_error,
 )
 from soilml.io.table import Table
-from soilml.numerics.prior import Prior
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import (
     COMMON_ERROR_INPUTS,
@@ -81,9 +78,13 @@ def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list
     upper_bounds = {f"{name}_max": prior[name].upper for name in bounded}
     bearing = float(soil.kc) / float(gear.width) + float(soil.kphi)
     widest = estimator.sets.context_ranges["bearing_std"][1] if estimator.sets else 0.0
-    bearing_std = _log_std(prior["kphi"], bearing) if "kphi" in prior else 0.0
+    kphi, bearing_std = prior.get("kphi"), 0.0  # of the logarithm of the bearing modulus
+    if kphi is not None and kphi.log:
+        bearing_std = math.log(kphi.upper / kphi.lower) / math.sqrt(12.0)
+    elif kphi is not None:
+        bearing_std = kphi.std / max(bearing, 1e-12)
     infers = estimator.sets and estimator.sets.common_errors.get(MODEL_ERROR_INPUT) == INFERRED
-    if infers and "kphi" not in prior:
+    if infers and kphi is None:
         bearing_std = USUAL_MODEL_ERRORS["bearing"]
         text = (
             f"kphi has no prior: its logarithm is taken to be off by {bearing_std:g}, as is usual; "
@@ -142,38 +143,24 @@ def narrower_priors(estimator: Estimator, case: Case) -> dict[str, tuple[float, 
     """Ends of the case's uniform priors that lie in those of a file and are not the same."""
     found = {}
     for i, name in enumerate(estimator.names):
-        own, low, high = case.prior.get(name), *_ends(estimator, i)
+        own, low, high = case.prior.get(name), estimator.prior.lower[i], estimator.prior.upper[i]
         slack = SAME_PRIOR * (high - low)
         if own is None or own.log or own.normal_std is not None:
             continue
         inside = low - slack <= own.lower and own.upper <= high + slack
         if inside and max(own.lower - low, high - own.upper) > slack:
-            found[name] = (max(own.lower, low), min(own.upper, high))
+            found[name] = (float(max(own.lower, low)), float(min(own.upper, high)))
     return found
-
-
-def _ends(estimator: Estimator, i: int) -> tuple[float, float]:
-    """Ends of the prior of quantity `i`."""
-    return float(estimator.prior.lower[i]), float(estimator.prior.upper[i])
-
-
-def _log_std(prior: Prior, bearing: float) -> float:
-    """Standard deviation of the logarithm of the bearing modulus."""
-    if prior.log:
-        return math.log(prior.upper / prior.lower) / math.sqrt(12.0)
-    return prior.std / max(bearing, 1e-12)
 
 
 def _prior_differences(estimator: Estimator, case: Case) -> list[Remark]:
     """Priors that differ from those of the file."""
     remarks, used = [], narrower_priors(estimator, case)
     for i, name in enumerate(estimator.names):
-        own, (low, high) = case.prior.get(name), _ends(estimator, i)
+        own, low, high = case.prior.get(name), estimator.prior.lower[i], estimator.prior.upper[i]
         uniform = own is not None and not own.log and own.normal_std is None
-        if own is not None and uniform:
-            off = max(abs(own.lower - low), abs(own.upper - high))
-            uniform = off <= SAME_PRIOR * (high - low)
-        if name not in used and not uniform:
+        off = max(abs(own.lower - low), abs(own.upper - high)) if own is not None else np.inf
+        if name not in used and not (uniform and off <= SAME_PRIOR * (high - low)):
             text = f"{name}: the file's prior is uniform from {low:.4g} to {high:.4g} "
             text += f"{declared(Soil)[name].unit}; that of the model is ignored"
             remarks.append(Remark("prior-ignored", text, (name,)))
@@ -197,7 +184,8 @@ def estimators_for_case(
     """
     given, remarks = [], []
     for loaded in estimators:
-        estimator = loaded if case is None else with_stated_model_error(loaded, case)
+        stated = case is not None and (case.discrepancy or case.remainder is not None)
+        estimator = with_exact_model(loaded) if stated else loaded  # it has no other errors
         if estimator.sets is not None and estimator.sets.missing_context:
             if case is None:
                 raise InputError(
@@ -213,7 +201,9 @@ def estimators_for_case(
         given.append(estimator)
     if case is not None:
         remarks += model_error_remarks(given[0], case, pooled=pooled)
-        remarks += ignored_soil_tests(case)
+        if case.soil_tests:
+            text = "[[soil.test]] is ignored: a file for the board takes no tests of the soil"
+            remarks.append(Remark("soil-tests-ignored", text))
     return given, remarks
 
 

@@ -15,7 +15,8 @@ from soilml.inference import constants
 from soilml.inference.evidence import linear_model, of_priors
 from soilml.inference.explanation import Explanation, StartedFit
 from soilml.inference.gaussian_terms import Hyperparameters
-from soilml.inference.problem import SOIL_ALONE, Hypothesis
+from soilml.inference.problem import SOIL_ALONE, Hypothesis, exclude_each_other
+from soilml.physics.effects.base import REFERENCE_LOAD, log_relative_slip
 
 if TYPE_CHECKING:
     from soilml.inference.search import Search
@@ -57,8 +58,10 @@ def _moves(
     The third entry of a move is the sign that the size of its effect must have, or 0.
     """
     h, fit, problem = node.hypothesis, node.fit, search.problem
-    s, w = problem.readings.log_slip_and_load
-    terms = {"slip_power": s, "by_slip": problem.readings.slip, "by_load": w}
+    slip, load = problem.readings.slip, problem.readings.load
+    # zero where the size of an effect is its parameter's value
+    terms = {"slip_power": log_relative_slip(slip), "by_slip": slip}
+    terms["by_load"] = np.log(load / REFERENCE_LOAD)
     extra: list[tuple[Coordinate, Floats]] = []
     moves: list[tuple[Hypothesis, list[int], int]] = []
     p = len(fit.x)
@@ -88,12 +91,17 @@ def _moves(
 
 def _signatures(search: Search, node: Explanation) -> list[Signature]:
     """How the readings change with each effect that may act beside those of a node."""
-    others = search.problem.effects_beside(node.hypothesis.effects)
+    effects, names = search.problem.effects, node.hypothesis.effects
+    others = {
+        name: effect
+        for name, effect in effects.items()
+        if not any(exclude_each_other(effect, effects[present]) for present in names)
+    }
     case, readings = node.fit.fitted(), search.problem.readings
     found, untestable = effect_signatures(case, readings, others)
     if node.hypothesis == SOIL_ALONE:
         search.untestable = untestable
-    search.signatures[node.hypothesis.effects] = found
+    search.signatures[names] = found
     return found
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.errors import InputError
 from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import GaussianTerms, Hyperparameters
 from soilml.inference.priors import log_density_of_size
 from soilml.quantities import Z_90
+from soilml.results import EstimatedValue
 
 #: Draws of a posterior, hyperparameters that are drawn of a component at most, draws of each at
 #: least, and proposals of each draw.
@@ -45,30 +45,8 @@ class Draws:
     residual: Floats
 
 
-@dataclass(frozen=True)
-class Marginal:
-    """A parameter's marginal: its mean, and ends of its central 90 % interval."""
-
-    mean: float
-    low: float
-    high: float
-    unit: str
-
-    @property
-    def std(self) -> float:
-        """Standard deviation of the normal distribution with an interval as wide."""
-        return (self.high - self.low) / (2.0 * Z_90)
-
-
-@dataclass(frozen=True, eq=False)
-class _Proposal:
-    """Coordinates (k, p) that were proposed, ln of their density, and their probability."""
-
-    node: Explanation
-    at: Hyperparameters
-    x: Floats
-    log_density: Floats
-    weight: float
+#: A component at hyperparameters that were drawn, coordinates (k, p), and ln of their density (k,).
+_Proposal = tuple[Component, Floats, Floats]
 
 
 def proposals(
@@ -90,8 +68,8 @@ def proposals(
         except np.linalg.LinAlgError:
             at, linear = one.at, one.node.linear.evaluate(one.at)
         wanted = PROPOSALS * max(FEWEST, count // parts)
-        x, log = _proposed(one.node, linear.step, linear.covariance, wanted, rng)
-        found.append(_Proposal(one.node, at, x, log, one.weight / parts))
+        own = Component(one.node, at, one.weight / parts)
+        found.append((own, *_proposed(one.node, linear.step, linear.covariance, wanted, rng)))
     return found
 
 
@@ -121,14 +99,13 @@ def _proposed(
     return x, -0.5 * (nu + p) * np.log1p((z**2).sum(axis=0) / nu)
 
 
-def weighted(own: _Proposal, terms: GaussianTerms, y: Floats | InputError) -> Draws:
-    """Proposals weighted by their density; equally where the model refuses all of them."""
-    fit, x = own.node.fit, own.x
+def weighted(own: Component, x: Floats, log_density: Floats, terms: GaussianTerms) -> Draws:
+    """Proposals weighted by their density; equally where the model carries none of them."""
+    fit = own.node.fit
+    start = replace(fit.linearisation.sinkage_at(x), nearest=True)
     near = own.node.linear.residual - (x - fit.x) @ fit.derivatives.T
     equal = Draws(own.node, own.at, x, np.full(len(x), own.weight / len(x)), near)
-    if isinstance(y, InputError):
-        return equal
-    residual = np.asarray(terms.readings.measured - y)
+    residual = np.asarray(terms.readings.measured - fit.problem.predict(x, start))
     answered = np.asarray(np.isfinite(residual).all(axis=1))
     if not answered.any():
         return equal
@@ -139,19 +116,19 @@ def weighted(own: _Proposal, terms: GaussianTerms, y: Floats | InputError) -> Dr
             log = log - 0.5 * (x[:, i] / c.std) ** 2
         elif c.of_candidate:
             log = log + log_density_of_size(x[:, i], c.lower < 0.0 < c.upper)
-    log = np.where(answered, log - own.log_density, -np.inf)
+    log = np.where(answered, log - log_density, -np.inf)
     weight = np.exp(log - np.logaddexp.reduce(log))
     residual = np.where(answered[:, None], residual, near)
     return Draws(own.node, own.at, x, own.weight * weight, residual)
 
 
-def marginal(values: Floats, weights: Floats, unit: str, factor: float) -> Marginal:
-    """Mean and central 90 % interval of weighted values (k,)."""
+def marginal(values: Floats, weights: Floats, unit: str, factor: float) -> EstimatedValue:
+    """Mean of weighted values (k,), and the standard deviation of a normal distribution whose
+    central 90 % interval is `factor` times as wide as theirs.
+    """
     order = np.argsort(values)
     share = weights[order] / weights.sum()
     middle = np.cumsum(share) - 0.5 * share
-    low, high = np.interp([0.05, 0.95], middle, values[order])
+    low, high = np.interp([0.05, 0.95], middle, values[order]).tolist()
     mean = float(weights @ values / weights.sum())
-    return Marginal(
-        mean, mean + factor * (float(low) - mean), mean + factor * (float(high) - mean), unit
-    )
+    return EstimatedValue(mean, factor * (high - low) / (2.0 * Z_90), unit)

@@ -305,7 +305,7 @@ class LinearisedFit:
         b = products[own, -1] - self.pull[own]
         free, step = ~held, np.zeros(len(own))
         step[free] = np.linalg.solve(curvature[np.ix_(free, free)], b[free])
-        covariance = np.linalg.inv(curvature)
+        variance = np.diag(np.linalg.inv(curvature))[first:]
         push = np.where(free, 0.0, b - curvature @ step)
         value = float(
             products[-1, -1]
@@ -316,43 +316,18 @@ class LinearisedFit:
             + self.cost
             + self.constant[own].sum()
         )
-        coordinates = [self.coordinates[i] for i in own]
-        for i in range(first, len(own)):
-            value += correction_of_prior(
-                coordinates[i],
-                float(self.x[own[i]]),
-                float(1.0 / covariance[i, i]),
-                float(step[i]),
-                float(push[i]),
-                held=bool(held[i]),
-            )
+        value += self.corrections(own[first:], variance, step[first:], push[first:])
         return value, step
 
-    def evidence_of_amplitudes(
-        self, products: Floats, constant: float, first: int, changes: Sequence[int], tried: Floats
-    ) -> Floats:
-        """Evidence (t,) with the weights of some columns at each amplitude (t,) of theirs.
-
-        products, constant: By `reduced`.
-        first: Coordinates before it are always in the model.
-        changes: Numbers of the columns, whose weights are normal about zero.
-
-        One eigenvalue problem answers for all amplitudes.
-        """
-        curvature = products[:first, :first] + np.diag(self.precision[:first])
-        curvature += self.information[:first, :first]
-        across = products[np.ix_(range(first), changes)]
-        own, b = products[np.ix_(changes, changes)], products[:first, -1] - self.pull[:first]
-        free, precision = ~self.held[:first], np.asarray(tried)[:, None] ** -2
-        step = np.linalg.solve(curvature[np.ix_(free, free)], np.column_stack([across, b])[free])
-        left, left_b = own - across[free].T @ step[:, :-1], products[changes, -1]
-        value, vector = np.linalg.eigh(left)
-        gain = (vector.T @ (left_b - across[free].T @ step[:, -1])) ** 2 / (value + precision)
-        whole = own - across.T @ np.linalg.solve(curvature, across)
-        determinants = np.log(np.linalg.eigvalsh(whole) + precision)
-        fixed = products[-1, -1] - b[free] @ step[:, -1] + np.linalg.slogdet(curvature)[1]
-        fixed += constant - first * LOG_2PI + self.cost + self.constant[:first].sum()
-        return np.asarray(fixed + (determinants - np.log(precision) - gain).sum(axis=1))
+    def corrections(
+        self, numbers: Sequence[int], variance: Floats, step: Floats, push: Floats
+    ) -> float:
+        """-2 ln of the factors by which exact priors of some coordinates change the evidence."""
+        total = 0.0
+        for i, v, s, p in zip(numbers, variance, step, push, strict=True):
+            own, x, held = self.coordinates[i], float(self.x[i]), bool(self.held[i])
+            total += correction_of_prior(own, x, float(1.0 / v), float(s), float(p), held=held)
+        return total
 
 
 def linear_model(
@@ -401,15 +376,5 @@ def linear_model(
 
 def of_priors(model: LinearisedFit, found: Evaluation) -> float:
     """-2 ln of the factors by which exact priors along each axis differ from their stand-ins."""
-    diagonal = np.diag(found.covariance)
-    return sum(
-        correction_of_prior(
-            c,
-            float(model.x[i]),
-            float(1.0 / diagonal[i]),
-            float(found.step[i]),
-            float(found.push[i]),
-            held=bool(model.held[i]),
-        )
-        for i, c in enumerate(model.coordinates)
-    )
+    variance = np.diag(found.covariance)
+    return model.corrections(range(len(variance)), variance, found.step, found.push)

@@ -12,7 +12,7 @@ D has the declared standard deviations, R the correlation of neighbouring sample
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -199,11 +199,7 @@ class GaussianTerms:
         variance = self.variance(at)[self.without_scatter]
         used = variance > 0.0
         columns = self.columns[:, self.without_scatter[used]] * np.sqrt(variance[used])
-        white = Whitening(noise, columns[:, :0], np.zeros(0)) @ columns
-        if not white.shape[1]:
-            return Whitening(noise, white, np.zeros(0))
-        basis, size, _ = np.linalg.svd(white, full_matrices=False)
-        return Whitening(noise, basis, 1.0 - 1.0 / np.sqrt(1.0 + size**2))
+        return Whitening.beside(noise, columns)
 
     def noise_std(self, at: Hyperparameters) -> Floats:
         """Standard deviation (m,) of the noise."""
@@ -313,7 +309,8 @@ def gaussian_terms(
     process = discrepancy_process(readings, case.discrepancy, least_eigenvalue=LEAST_EIGENVALUE)
     channels = len(readings.channels)
     parts, group = [process.columns], [process.channel]
-    stated = [_is_declared(case.discrepancy, name) for name in readings.channels]
+    declared = (case.discrepancy.get(column(name)) for name in readings.channels)
+    stated = [own is not None and own.amplitude(1.0) > 0.0 for own in declared]
     known = process.columns[:, np.asarray(stated, bool)[process.channel]]
     for own in (known, fixed):
         if own is not None and own.shape[1]:
@@ -366,11 +363,6 @@ def _by_run(readings: Readings, scatter: Floats) -> Floats:
     return np.concatenate(
         [np.where((run == r)[:, None], scatter, 0.0) for r in range(len(readings.runs))], axis=1
     )
-
-
-def _is_declared(discrepancy: Mapping[str, Any], channel: str) -> bool:
-    own = discrepancy.get(column(channel))
-    return own is not None and own.amplitude(1.0) > 0.0
 
 
 def scatter_columns(case: Case, readings: Readings) -> Floats:

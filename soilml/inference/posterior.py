@@ -12,16 +12,15 @@ from numpy.typing import NDArray
 from soilml.arrays import Floats
 from soilml.fitting.coordinates import values_at
 from soilml.fitting.covariance import Whitening
-from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
 from soilml.inference import constants
-from soilml.inference.draws import DRAWS, Component, Draws, Marginal, marginal, proposals, weighted
+from soilml.inference.draws import DRAWS, Component, Draws, marginal, proposals, weighted
 from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import GaussianTerms, Hyperparameters
 from soilml.inference.priors import unknown_cause
 from soilml.inference.problem import SOIL_ALONE, Hypothesis, InferenceProblem
 from soilml.inference.search import Search
-from soilml.remarks import Remark
+from soilml.results import EstimatedValue
 
 Names = tuple[str, ...]
 
@@ -123,16 +122,6 @@ class Posterior:
         weights = found.weights[np.isin(found.used, own)] * np.sqrt(terms.variance(at)[own])
         return np.asarray(terms.columns[:, own] @ weights)
 
-    @property
-    def signatures(self) -> list[Signature]:
-        """Signatures of all effects beside the soil alone."""
-        return self.search.signatures.get((), [])
-
-    @property
-    def untestable(self) -> dict[str, Remark]:
-        """Why the rows cannot test some effects, by name."""
-        return self.search.untestable
-
     @cached_property
     def _weights(self) -> tuple[list[Names], Floats, Floats]:
         """Effects, probability, and share that counts for the effects, of every hypothesis."""
@@ -166,7 +155,7 @@ class Posterior:
     def only_channel(self) -> dict[str, str]:
         """The channel of each effect that changes one of the measured channels alone, by name."""
         readings, found = self.terms.readings, {}
-        for s in self.signatures:
+        for s in self.search.signatures.get((), []):
             change = np.abs(s.column / readings.std)
             largest = readings.channel[int(np.argmax(change))]
             others = change[readings.channel != largest]
@@ -190,7 +179,11 @@ class Posterior:
         node = self.search.nodes.get(hypothesis)
         several = len(self.terms.readings.channels) > 1
         one_channel = several and all(name in self.only_channel for name in names)
-        return node is None or one_channel or shape_deviation(node) > constants.FAR_LAW
+        if node is None or one_channel:
+            return True
+        fit, shapes = node.fit, [i for i, c in enumerate(node.fit.coordinates) if c.is_shape]
+        # squared distance of the shapes from the catalogue's laws, in prior variances
+        return float(np.sum(fit.x[shapes] ** 2 * fit.precision[shapes])) > constants.FAR_LAW
 
     def node_weight(self, node: Explanation) -> float:
         """Probability of a fitted hypothesis."""
@@ -304,19 +297,14 @@ class Posterior:
         proposed = [
             own for one in self.components() for own in proposals(one, self.terms, count, rng)
         ]
-        found = []
-        for own in proposed:
-            fit = own.node.fit
-            near = replace(fit.linearisation.sinkage_at(own.x), nearest=True)
-            found.append(weighted(own, self.terms, fit.problem.predict(own.x, near)))
-        self._drawn[seed, count] = found
-        return found
+        self._drawn[seed, count] = [weighted(*own, self.terms) for own in proposed]
+        return self._drawn[seed, count]
 
     def beside(self, fixed: Floats, inner: Sequence[Floats] = ()) -> Posterior:
         """The same hypotheses beside further Gaussian terms; see `Search.beside`."""
-        return Posterior(self.search.beside(fixed, inner, constants.LEAST_DRAWN))
+        return Posterior(self.search.beside(fixed, inner))
 
-    def soil_marginals(self, seed: int, factor: float = 1.0) -> dict[str, Marginal]:
+    def soil_marginals(self, seed: int, factor: float = 1.0) -> dict[str, EstimatedValue]:
         """Marginals of the soil parameters that are free within the case's priors, by path.
 
         factor: By which intervals are widened about their mean.
@@ -334,10 +322,3 @@ class Posterior:
                 np.concatenate(values), np.concatenate(weights), c.unit, factor
             )
         return found
-
-
-def shape_deviation(node: Explanation) -> float:
-    """Squared distance of the shapes from the catalogue's laws, in prior variances."""
-    fit = node.fit
-    shapes = [i for i, c in enumerate(fit.coordinates) if c.is_shape]
-    return float(np.sum(fit.x[shapes] ** 2 * fit.precision[shapes]))

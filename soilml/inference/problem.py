@@ -104,8 +104,11 @@ class InferenceProblem:
         names = [name for name in OPENED if name in known]
         wide = {c.path: c.prior for c in select_free(replace(self.case, prior={}), names)}
         own = self.case.prior
-        opened = {path: _both(p, own[path]) if path in own else p for path, p in wide.items()}
-        return replace(self.case, prior=own | opened)
+        for path, prior in wide.items():  # a prior over the range of both
+            other = own.get(path, prior)
+            lower, upper = min(prior.lower, other.lower), max(prior.upper, other.upper)
+            wide[path] = Prior(lower, upper, log=prior.log and lower > 0.0)
+        return replace(self.case, prior=own | wide)
 
     @cached_property
     def wide_soil(self) -> tuple[Coordinate, ...]:
@@ -157,15 +160,6 @@ class InferenceProblem:
             value -= 2.0 * float(np.log(other if hypothesis.free_law else 1.0 - other))
         return value
 
-    def effects_beside(self, names: Sequence[str]) -> dict[str, type[Effect]]:
-        """The effects that may act beside others: of none of their families."""
-        present = [self.effects[name] for name in names]
-        return {
-            name: effect
-            for name, effect in self.effects.items()
-            if not any(exclude_each_other(effect, other) for other in present)
-        }
-
 
 def _as_fields(value: Any) -> Any:
     """A value by its type and fields, whose text tells any two apart."""
@@ -213,9 +207,3 @@ def exclude_each_other(effect: type[Effect], other: type[Effect]) -> bool:
         return False
     family = effect.about.family
     return base == other_base or (bool(family) and other.about.family == family)
-
-
-def _both(wide: Prior, own: Prior) -> Prior:
-    """A prior over the range of two."""
-    lower, upper = min(wide.lower, own.lower), max(wide.upper, own.upper)
-    return Prior(lower, upper, log=wide.log and lower > 0.0)

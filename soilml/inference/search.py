@@ -21,7 +21,6 @@ from soilml.fitting.covariance import noise_of_operation
 from soilml.fitting.damped_descents import COARSE, FINE, Tolerance, descend
 from soilml.fitting.effect_signatures import Signature, current_size
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
-from soilml.fitting.predictions import Linearisation
 from soilml.inference import constants
 from soilml.inference.additions import additions
 from soilml.inference.conditional import leave_one_out
@@ -64,6 +63,7 @@ class Search:
     progress: Callable[[float], None] = lambda _: None
     nodes: dict[Hypothesis, Explanation] = field(default_factory=dict)
     predicted: dict[Hypothesis, StartedFit] = field(default_factory=dict)
+    #: Why the rows cannot test some effects, by name, and signatures of others beside effects
     untestable: dict[str, Remark] = field(default_factory=dict)
     signatures: dict[tuple[str, ...], list[Signature]] = field(default_factory=dict)
     _tried: set[Hypothesis] = field(default_factory=set)
@@ -98,7 +98,7 @@ class Search:
         starts = [{c.path: c.prior.fraction(c.nominal) for c in problem.soil}]
         starts += [dict.fromkeys((c.path for c in problem.soil), x) for x in SOIL_STARTS]
         jobs = [StartedFit(SOIL_ALONE, start, self.terms.first(), none) for start in starts]
-        answers = self.fit(jobs, COARSE)
+        answers = [self.fit(job) for job in jobs]
         fits = [fit for fit in answers if not isinstance(fit, InputError)]
         if not fits:
             raise next(error for error in answers if isinstance(error, InputError))
@@ -150,7 +150,7 @@ class Search:
         is not needed. They are predicted from the soil alone under noise and scatter.
         """
         at, linear = soil.without.at, plain.linearisation
-        (fit,) = self.fit([StartedFit(SOIL_ALONE, plain.start_values(), at, soil.outliers, linear)])
+        fit = self.fit(StartedFit(SOIL_ALONE, plain.start_values(), at, soil.outliers, linear))
         if isinstance(fit, InputError):
             return
         model = linear_model(self.terms, fit, soil.outliers)
@@ -169,12 +169,11 @@ class Search:
                 break
         self._settle(jobs, float("inf"), constants.NEAR_AT_FIRST)
 
-    def beside(self, fixed: Floats, inner: Sequence[Floats], least: float) -> Search:
-        """The hypotheses above a probability, fitted beside further Gaussian terms.
+    def beside(self, fixed: Floats, inner: Sequence[Floats]) -> Search:
+        """The hypotheses that are drawn from, fitted beside further Gaussian terms.
 
         fixed (m, k): Columns of unit variance.
         inner: Columns (m, q) of discrepancies, each of which has an amplitude of its own.
-        least: Probability below which a hypothesis is left out.
         """
         known, first = self.terms, self.terms.channels
         terms = gaussian_terms(
@@ -186,7 +185,7 @@ class Search:
         def at(own: Hyperparameters) -> Hyperparameters:
             return replace(own, log=np.insert(own.log, first, np.full(len(inner), FIRST_AMPLITUDE)))
 
-        worst = self.lowest - 2.0 * float(np.log(least))
+        worst = self.lowest - 2.0 * float(np.log(constants.LEAST_DRAWN))
         jobs = [
             StartedFit(h, n.fit.start_values(), at(n.at), n.outliers, n.fit.linearisation)
             for h, n in self.nodes.items()
@@ -197,23 +196,21 @@ class Search:
 
     # ---- fits
 
-    def fit(
-        self, jobs: Sequence[StartedFit], tolerance: Tolerance = COARSE
-    ) -> list[Solution | InputError]:
-        """The fit of each job; the error of one that the model refuses."""
-        found = []
-        for job in jobs:
-            coordinates = self.problem.coordinates(job.hypothesis)
-            whiten = self.terms.whiten(job.at, job.outliers)
-            case = self.problem.case_of(job.hypothesis)
-            own = LeastSquaresProblem(case, coordinates, self.problem.readings, whiten)
-            first = [job.start.get(c.path, self._first_size(c)) for c in coordinates]
-            zero = [0.0 if c.of_candidate else job.start.get(c.path, 0.5) for c in coordinates]
-            known = job.near
-            if known is not None and len(known.x) != len(coordinates):
-                known = None
-            found.append(_careful(own, np.asarray(first), np.asarray(zero), known, tolerance))
-        return found
+    def fit(self, job: StartedFit, tolerance: Tolerance = COARSE) -> Solution | InputError:
+        """The fit of a job; the error where the model refuses it twice."""
+        coordinates = self.problem.coordinates(job.hypothesis)
+        whiten, case = self.terms.whiten(job.at, job.outliers), self.problem.case_of(job.hypothesis)
+        own = LeastSquaresProblem(case, coordinates, self.problem.readings, whiten)
+        first = [job.start.get(c.path, self._first_size(c)) for c in coordinates]
+        zero = [0.0 if c.of_candidate else job.start.get(c.path, 0.5) for c in coordinates]
+        known = job.near if job.near and len(job.near.x) == len(coordinates) else None
+        answer: Solution | InputError
+        for start, near in ((first, known), (zero, None)):  # again from effects at zero
+            try:
+                return descend(own, np.asarray(start), tolerance, near)
+            except InputError as error:
+                answer = error
+        return answer
 
     def _first_size(self, coordinate: Coordinate) -> float:
         """The case's own value of an effect's size, else a size off zero; shapes start at zero."""
@@ -262,8 +259,8 @@ class Search:
         found: dict[Hypothesis, Explanation] = {}
         for turn in range(constants.FITS_IN_TURN):
             again = []
-            fits = self.fit(jobs, COARSE if turn == 0 else FINE)
-            for job, fit in zip(jobs, fits, strict=True):
+            for job in jobs:
+                fit = self.fit(job, COARSE if turn == 0 else FINE)
                 if isinstance(fit, InputError) or not np.isfinite(fit.prediction).all():
                     continue
                 try:
@@ -352,24 +349,6 @@ class Search:
 def _by_value(predicted: StartedFit) -> tuple[float, Hypothesis]:
     """What predictions are ordered by: their values, then their hypotheses."""
     return predicted.value, predicted.hypothesis
-
-
-def _careful(
-    problem: LeastSquaresProblem,
-    first: Floats,
-    zero: Floats,
-    near: Linearisation | None,
-    tolerance: Tolerance,
-) -> Solution | InputError:
-    """One fit; where the model refuses its trials, again from effects at zero."""
-    try:
-        return descend(problem, first, tolerance, near)
-    except InputError:
-        pass
-    try:
-        return descend(problem, zero, tolerance)
-    except InputError as error:
-        return error
 
 
 def _distance(terms: GaussianTerms, a: Hyperparameters, b: Hyperparameters) -> float:

@@ -86,10 +86,6 @@ class PressureSinkageFit:
         z = self.depth
         return self.draws.estimate(lambda d: (d[0] + d[1] / width) * z ** -d[2], "N/m^(n+2)")
 
-    def pressure_at_depth(self, size: float) -> SpreadEstimate:
-        """Pressure at the reference depth under a plate of a size (m)."""
-        return self.draws.estimate(lambda d: d[0] + d[1] / size, "Pa")
-
     def estimates(self) -> dict[str, SpreadEstimate]:
         """What the tests determine: n, and kc with kphi, or k for the one width tested."""
         z, found = self.depth, {"n": self.draws.estimate(lambda d: d[2], "1")}

@@ -73,7 +73,12 @@ class BevameterResult(Result):
         names = ", ".join(name.replace("_", " ") for name in found)
         open_ = self.shear is not None and self.shear.shear_modulus is None
         verdict = f"{tests} tests determine {names}."
-        drawings = _drawings(self)
+        drawings: list[Callable[[Any], None]] = []
+        if self.plates is not None:
+            drawings.append(partial(_draw_plates, fit=self.plates))
+        if self.shear is not None:
+            drawings += [] if open_ else [partial(_draw_curves, fit=self.shear)]
+            drawings.append(partial(_draw_strengths, fit=self.shear))
         count, size = len(drawings), (4.6 * len(drawings), 3.9)
         return Report(
             kind="bevameter",
@@ -111,47 +116,29 @@ class BevameterResult(Result):
             "prior": {name: prior.as_setting() for name, prior in self.prior.items()},
             "tests": [asdict(test) for test in self.tests],  # type: ignore[call-overload]
             "remarks": [remark.as_json() for remark in self.remarks],
-            "plate_tests": [] if self.plates is None else _plate_entries(self.plates),
-            "shear_tests": [] if self.shear is None else _shear_entries(self.shear),
+            "plate_tests": [
+                {
+                    "test": test.name,
+                    "plate_m": test.level,
+                    "n": curve.exponent,
+                    "k": math.exp(curve.log_pressure) * plates.depth**-curve.exponent,
+                    "misfit": curve.misfit,
+                }
+                for plates in filter(None, [self.plates])
+                for test, curve in zip(plates.tests, plates.curves, strict=True)
+            ],
+            "shear_tests": [
+                {
+                    "test": test.name,
+                    "normal_stress_Pa": test.level,
+                    "strength_Pa": curve.strength,
+                    "shear_modulus_m": curve.modulus if test.has_curve else None,
+                    "misfit": curve.misfit,
+                }
+                for shear in filter(None, [self.shear])
+                for test, curve in zip(shear.tests, shear.curves, strict=True)
+            ],
         }
-
-
-def _plate_entries(fit: PressureSinkageFit) -> list[dict[str, Any]]:
-    return [
-        {
-            "test": test.name,
-            "plate_m": test.level,
-            "n": curve.exponent,
-            "k": math.exp(curve.log_pressure) * fit.depth**-curve.exponent,
-            "misfit": curve.misfit,
-        }
-        for test, curve in zip(fit.tests, fit.curves, strict=True)
-    ]
-
-
-def _shear_entries(fit: ShearFit) -> list[dict[str, Any]]:
-    return [
-        {
-            "test": test.name,
-            "normal_stress_Pa": test.level,
-            "strength_Pa": curve.strength,
-            "shear_modulus_m": curve.modulus if test.has_curve else None,
-            "misfit": curve.misfit,
-        }
-        for test, curve in zip(fit.tests, fit.curves, strict=True)
-    ]
-
-
-def _drawings(result: BevameterResult) -> list[Callable[[Any], None]]:
-    """What draws each panel: pressure against sinkage, shear curves, strengths with their line."""
-    found: list[Callable[[Any], None]] = []
-    if result.plates is not None:
-        found.append(partial(_draw_plates, fit=result.plates))
-    if result.shear is not None:
-        if any(test.has_curve for test in result.shear.tests):
-            found.append(partial(_draw_curves, fit=result.shear))
-        found.append(partial(_draw_strengths, fit=result.shear))
-    return found
 
 
 def _draw(drawings: Sequence[Callable[[Any], None]], axes: Any) -> None:

@@ -144,7 +144,7 @@ def pressure_test(fit: PressureSinkageFit, case: Case | None) -> PlatePressure |
         width = fit.sizes[0]
         if any(max(w / width, width / w) > LEAST_SIZE_RATIO for w in widths):
             return None
-    pressure = fit.pressure_at_depth(width)
+    pressure = fit.draws.estimate(lambda d: d[0] + d[1] / width, "Pa")
     if (scatter := _scatter(pressure)) is None:
         return None
     width, depth, value = map(round_significant, (width, fit.depth, pressure.value))

@@ -217,7 +217,8 @@ def test_priors_that_a_file_ignores_are_named_and_narrower_ones_are_used(case, a
     fitted = fitting(case, any_wheel)
     found, warnings = trained.condition_on_case(with_exact_model(any_wheel), fitted)
     assert warnings == [] and trained.narrower_priors(found, fitted) == {}
-    low, high = trained._ends(found, found.names.index("friction_angle"))
+    i = found.names.index("friction_angle")
+    low, high = float(found.prior.lower[i]), float(found.prior.upper[i])
     width = high - low
 
     def with_angle(lower, upper, **kind):

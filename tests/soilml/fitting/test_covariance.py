@@ -13,7 +13,7 @@ RESIDUAL = RNG.standard_normal((4, 12))
 
 def test_whitened_values_have_the_inverse_covariance_as_product():
     covariance = np.diag(STD[0] ** 2) + COLUMNS @ COLUMNS.T
-    root = Whitening.of(STD[0], COLUMNS) @ np.eye(12)
+    root = Whitening.beside(1.0 / STD[0], COLUMNS) @ np.eye(12)
     assert root.T @ root == pytest.approx(np.linalg.inv(covariance))
 
 

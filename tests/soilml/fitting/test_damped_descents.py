@@ -5,7 +5,7 @@ import pytest
 from gap_sets import MODEL, case_of, driven
 
 from soilml.fitting.coordinates import select_free
-from soilml.fitting.damped_descents import EXACT, bounded_step, descend, descend_each
+from soilml.fitting.damped_descents import EXACT, bounded_step, descend
 from soilml.fitting.least_squares import LeastSquaresProblem
 from soilml.fitting.readings import stack_readings
 
@@ -46,8 +46,7 @@ def test_a_start_with_a_known_linearisation_leads_to_the_same_fit():
     own = of_soil(case_of(), driven(case_of(), seed=2))
     start = np.full(3, 0.3)
     known = own.linearised(start).linearisation
-    alone, beside, elsewhere = descend_each(
-        [own] * 3, [start, start, np.full(3, 0.6)], [None, known, known]
-    )
+    alone, beside = descend(own, start), descend(own, start, near=known)
+    elsewhere = descend(own, np.full(3, 0.6), near=known)
     assert np.array_equal(alone.x, beside.x) and alone.objective == beside.objective
     assert elsewhere.x == pytest.approx(alone.x, abs=2e-3)

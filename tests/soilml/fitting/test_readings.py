@@ -32,7 +32,7 @@ def stacked(table=SMALL):
 def test_a_table_without_a_reading_has_none():
     table = Table({name: SMALL[name] for name in ("run", "slip", "load_N")})
     found = stacked(table)
-    assert (len(found), found.channels, found.noise) == (0, (), ())
+    assert (len(found), found.channels) == (0, ())
     assert found.row.size == found.channel.size == found.std.size == 0
     assert found.slip_std.tolist() == found.load_std.tolist() == [0.0] * 5
 
@@ -44,9 +44,8 @@ def test_noise_that_is_not_positive_is_the_median_of_the_others():
     none = stacked(replace(SMALL, columns=SMALL.columns | {"torque_Nm_std": np.zeros(5)}))
     assert none.undeclared == ("torque_Nm",) and not none.notes
     noise = case_of().noise
-    assert found.noise == (noise["torque_Nm"], noise["sinkage_m"])
     assert found.std[4:] == pytest.approx(noise["sinkage_m"].std(found.measured[4:]))
-    assert found.from_case.tolist() == [False] * 4 + [True] * 4  # the table has that of torque
+    assert found.share.tolist() == [0.0] * 4 + [noise["sinkage_m"].share] * 4  # torque: table
     assert found.slip_std.tolist() == [0.01, 0.02, 0.0, 0.03, 0.05]
     assert typical_std(found.slip_std) == pytest.approx(0.025)  # the median of those above zero
     assert not found.load_std.any() and typical_std(found.load_std) == 0.0
@@ -66,18 +65,20 @@ def test_noise_is_that_of_expected_values_and_never_nothing():
     expected = 2.0 * found.measured
     expected[0] = 0.0
     other = replace(noise, share=3.0 * noise.share)
-    std = replace(found, noise=(noise, other, other)).with_noise_at(expected).std
+    share = np.where(torque, noise.share, other.share)
+    std = replace(found, share=share, constant=0.0 * share).with_noise_at(expected).std
     floor = 1e-3 * np.median(found.std[torque])
     own = np.maximum(noise.std(expected[torque]), floor)
     assert std[torque] == pytest.approx(own, rel=1e-12) and std[torque].min() > 0.0
-    floors = np.asarray([1e-3 * np.median(found.std[found.channel == i]) for i in found.channel])
+    by = other.std(found.measured)
+    floors = np.asarray([1e-3 * np.median(by[found.channel == i]) for i in found.channel])
     own = np.maximum(other.std(expected), floors)
     assert std[~torque] == pytest.approx(own[~torque], rel=1e-12)
-    fixed = replace(found, noise=(None,) * 3, std=np.where(torque, found.std, 0.5))
-    fixed.std[torque.argmax()] = 1e-9
+    fixed = replace(found, constant=np.where(torque, found.std, 0.5), share=0.0 * share)
+    fixed.constant[torque.argmax()] = 1e-9
     kept = fixed.with_noise_at(expected).std
     assert (kept[~torque] == 0.5).all()
-    assert kept[torque.argmax()] == pytest.approx(1e-3 * np.median(fixed.std[torque]))
+    assert kept[torque.argmax()] == pytest.approx(1e-3 * np.median(fixed.constant[torque]))
 
 
 def test_a_channel_of_unknown_noise_is_left_out_with_a_note():
@@ -87,7 +88,6 @@ def test_a_channel_of_unknown_noise_is_left_out_with_a_note():
     kept = unknown.with_known_noise()
     (note,) = kept.notes
     assert kept.channels == (found.channels[0], found.channels[2])
-    assert kept.noise == (found.noise[0], found.noise[2])
     assert set(kept.channel[:32]) == {0} and set(kept.channel[32:]) == {1}
     assert kept.measured.tolist() == found.measured[found.channel != 1].tolist()
     assert note.code == "unused-channel"

@@ -14,7 +14,7 @@ from soilml.fitting.coordinates import select_free
 from soilml.fitting.least_squares import SoilTestTerms
 from soilml.fitting.misfit import problem_under_noise
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.posterior import PosteriorDensity, prior_fractions
+from soilml.identification.posterior import posterior_density, prior_fractions
 from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength
 from soilml.remarks import texts
@@ -81,7 +81,7 @@ def test_posterior_with_a_test_is_that_of_a_grid():
     values = np.stack([f.prior.at(u[:, i]) for i, f in enumerate(free)], axis=1)
     strength = values[:, 0] + 8000.0 * np.tan(values[:, 1])
     problem = problem_under_noise(a_case(), data, free)
-    logs = PosteriorDensity(problem, np.full(2, 0.5))(u)
+    logs = posterior_density(problem, np.full(2, 0.5))(u)
     logs = logs - 0.5 * (np.log(strength / 5000.0) / 0.1) ** 2
     weights = np.exp(logs - logs.max())
     weights /= weights.sum()

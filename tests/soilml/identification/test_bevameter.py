@@ -88,7 +88,8 @@ def test_ranges_of_plate_tests_contain_mean_and_next_place(sizes):
     mean, place = [], []
     for seed in range(120):
         fit = bevameter(plates(sizes, 3, scatter, seed)).plates
-        n, pressure = fit.estimates()["n"], fit.pressure_at_depth(sizes[-1])
+        n = fit.estimates()["n"]
+        pressure = fit.draws.estimate(lambda d: d[0] + d[1] / sizes[-1], "Pa")
         level, change = np.asarray(scatter) * rng.standard_normal(2)
         p = (KC / sizes[-1] + KPHI) * fit.depth**N
         other = p * np.exp(level) * (fit.depth / 0.06) ** change

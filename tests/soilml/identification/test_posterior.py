@@ -14,7 +14,7 @@ from soilml.errors import FitError
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.misfit import fit_under_declared_noise
 from soilml.fitting.readings import stack_readings
-from soilml.identification.posterior import PosteriorDensity, sample_posterior
+from soilml.identification.posterior import posterior_density, sample_posterior
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.remarks import texts
@@ -157,7 +157,7 @@ def test_a_narrow_and_bent_posterior_keeps_its_tails():
     readings = stack_readings(case, driven(case, loads=(60.0, 120.0), slips=10))
     optimum = fit_under_declared_noise(case, readings, free)
     found = sample_posterior(optimum)
-    whole = importance_sample(PosteriorDensity(optimum.problem, optimum.x), len(free), seed=1)
+    whole = importance_sample(posterior_density(optimum.problem, optimum.x), len(free), seed=1)
     ends = np.asarray([0.02, 0.5, 0.98])
     std = np.sqrt(whole.mean((whole.u - whole.mean(whole.u)) ** 2))
     off = (found.quantiles(found.u, ends) - whole.quantiles(whole.u, ends)) / std
