@@ -15,13 +15,19 @@ from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.exact_check import with_exact_check
 from soilml.onboard.features import flatten_readings, without_copies
-from soilml.onboard.gaussian_product import product_of_rows
+from soilml.onboard.gaussian_product import gaussian_product
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.memory import Memory, check_memory, memory_identity
 from soilml.onboard.metadata import read_fields, read_prior, read_probe
 from soilml.onboard.model_file import Session, find_model, open_model, verified
-from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS, Floats
+from soilml.onboard.set_contract import (
+    LEAST_SHARE_IN_RANGE,
+    OPTIONAL_READINGS,
+    REQUIRED_READINGS,
+    Floats,
+)
 from soilml.onboard.set_posterior import SetPosterior, estimate_of_set
+from soilml.quantities import Z_90
 
 NoiseModels = Mapping[str, tuple[float, float]]
 
@@ -29,6 +35,10 @@ READINGS = (*REQUIRED_READINGS, *OPTIONAL_READINGS)
 ROW_OUTPUTS = ("mean", "std", "covariance", "in_range")  # Outputs of the graph for single readings
 #: Rows fed to the graph at a time: bounds its working memory, which the runtime keeps.
 ROWS_PER_CALL = 4096
+#: Correlation of the errors of two rows of one soil. 90 % intervals of 4 to 40 rows of wheel_lssvm
+#: and wheel_mlp then cover 85 (steady) to 97 % (varied) of 200 runs each. With 0.3 they cover from
+#: 83 %; with 0.5 they cover from 85 % too, and the error of K from 12 varied rows is 7 % larger.
+CORRELATION = 0.4
 #: Largest deviation of mean or std from the file's own probe, in prior standard deviations.
 PROBE_TOLERANCE = 1e-4
 #: The same for sets: a rounding difference can change which samples are drawn.
@@ -213,7 +223,7 @@ class Estimator:
         rows = dict(zip(self.inputs, flat, strict=True))
         if flat[0].size == 0:
             raise InputError("no reading given; needed is one or more")
-        return product_of_rows(self(**without_copies(rows, self.inputs)))
+        return _product_of_rows(self(**without_copies(rows, self.inputs)))
 
     def start(self) -> Memory:
         """The memory of a soil before its first reading; see `step`."""
@@ -338,3 +348,27 @@ def run_rows(session: Session, rows: Mapping[str, Floats]) -> dict[str, NDArray[
     mean, std, covariance, in_range = joined
     values = (mean.astype(np.float64), std.astype(np.float64), covariance.astype(np.float64))
     return dict(zip(ROW_OUTPUTS, (*values, in_range), strict=True))
+
+
+def _product_of_rows(single: Estimate) -> Estimate:
+    r"""One estimate from those of the m rows of a soil, each by itself, (m,).
+
+    Rows whose errors have the correlation :math:`\rho` are worth
+    :math:`m / (1 + (m - 1) \rho)` independent ones. The answer is the prior where more than half of
+    the rows are out of range.
+    """
+    valid, prior = single.in_range, single.prior
+    if valid.size == 1:
+        return single.at(0)
+    used, head = int(valid.sum()), (single.names, single.units, prior)
+    found = Estimate.from_prior(*head)
+    if used >= LEAST_SHARE_IN_RANGE * valid.size:
+        weight = 1.0 / (1.0 + (used - 1) * CORRELATION)
+        mean, covariance = gaussian_product(
+            single.mean[valid], single.covariance[valid], prior, weight
+        )
+        std, factor = np.sqrt(np.diag(covariance)), np.full(len(prior.std), Z_90)
+        mean = np.clip(mean, prior.lower, prior.upper)
+        found = Estimate.gaussian(*head, mean, covariance, std, np.asarray(True), factor)
+    aside = np.asarray(valid.size - used)
+    return replace(found, rows_used=np.asarray(used), rows_set_aside=aside)
