@@ -93,10 +93,6 @@ class Dataset:
             row=self.row[index],
         )
 
-    def rows_of_each_run(self, most: int = 2) -> NDArray[np.int64]:
-        """Indices of at most `most` rows of each run, whose errors are correlated."""
-        return np.sort(np.concatenate([run[:most] for run in self.runs()]))
-
     def runs(self) -> list[NDArray[np.int64]]:
         """Row indices of each run, shuffled.
 

@@ -155,7 +155,12 @@ class Estimator:
         array([ True,  True])
         """
         if self.sets is not None and self.sets.sets_only:
-            return self._rows_as_sets(self.sets, measured)
+            sets = self._configured_sets  # every row is a set of its own
+            rows = sets.rows(measured)
+            shape = np.broadcast_shapes(*map(np.shape, measured.values()))
+            single = ({k: v[i : i + 1] for k, v in rows.items()} for i in range(rows["slip"].size))
+            each = (self._set_estimate(row, sets.start())[0] for row in single)
+            return Estimate.stack(each, shape)
         flat, shape = flatten_readings(self.inputs, measured)
         rows = dict(zip(self.inputs, flat, strict=True))
         found = run_rows(self.session, rows)
@@ -306,13 +311,6 @@ class Estimator:
         raise InputError(
             "an Estimator cannot be pickled: hand over its path, and load it by Estimator.load"
         )
-
-    def _rows_as_sets(self, sets: SetPosterior, measured: Mapping[str, Any]) -> Estimate:
-        """Every row as a set of its own."""
-        rows = self._configured_sets.rows(measured)
-        shape = np.broadcast_shapes(*(np.shape(value) for value in measured.values()))
-        single = ({k: v[i : i + 1] for k, v in rows.items()} for i in range(rows["slip"].size))
-        return Estimate.stack((self._set_estimate(row, sets.start())[0] for row in single), shape)
 
     def _reproduces(
         self, readings: Any, mean: Any, std: Any, in_range: Any, given: Any = None

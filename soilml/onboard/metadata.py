@@ -40,7 +40,10 @@ def _read_fields(metadata: Mapping[str, str]) -> dict[str, Any]:
     inputs = _read_quantities(metadata, "inputs", READABLE)
     outputs = _read_quantities(metadata, "outputs", QUANTITIES)
     _check_provenance(metadata)
-    _check_prior(outputs)
+    for entry in outputs:
+        mean, std, lower, upper = (entry[key] for key in _PRIOR)
+        if not (all(map(_is_number, (mean, std, lower, upper))) and std > 0.0 and lower < upper):
+            raise ValueError("outputs: a prior that is none")
     together = json.loads(metadata["together"])
     factor = np.asarray(together["alone"], np.float64).reshape(-1)
     sets = SetPosterior.of(json.loads(metadata["set"])) if "set" in metadata else None
@@ -99,13 +102,6 @@ def _read_quantities(
     if any(entry["unit"] != QUANTITIES[entry["name"]].unit for entry in entries):
         raise ValueError(f"{key}: a unit that is not that of the quantity")
     return entries
-
-
-def _check_prior(outputs: list[dict[str, Any]]) -> None:
-    for entry in outputs:
-        mean, std, lower, upper = (entry[key] for key in _PRIOR)
-        if not (all(map(_is_number, (mean, std, lower, upper))) and std > 0.0 and lower < upper):
-            raise ValueError("outputs: a prior that is none")
 
 
 def _check_set(sets: SetPosterior) -> None:

@@ -122,7 +122,10 @@ class SetPosterior:
 
         Raises `InputError` if a name is not known, or a value is out of the range of the file.
         """
-        parts = {name: _noise_parts(name, value) for name, value in _items("noise", noise)}
+        if not isinstance(noise, Mapping):
+            given = type(noise).__name__
+            raise InputError(f"noise is a {given}; needed is a dict of names to values")
+        parts = {name: _noise_parts(name, value) for name, value in noise.items()}
         values = {name: as_number(name, value) for name, value in context.items()}
         common = {name: values.pop(name) for name in COMMON_ERROR_INPUTS if name in values}
         for name, value in common.items():
@@ -282,12 +285,6 @@ def constant_noise_factor(torque: Floats, constant: float) -> Floats:
     """
     share = constant / np.maximum(np.abs(torque), POSITIVE_STD)
     return np.asarray(np.exp(-2.0 * np.minimum(share, MOST_CONSTANT_SHARE) ** 2))
-
-
-def _items(name: str, value: Any) -> list[tuple[Any, Any]]:
-    if not isinstance(value, Mapping):
-        raise InputError(f"{name} is a {type(value).__name__}; needed is a dict of names to values")
-    return list(value.items())
 
 
 def _noise_parts(name: Any, value: Any) -> tuple[float, float]:

@@ -8,7 +8,6 @@ from typing import Any
 
 from soilml.quantities import SHEAR
 from training.calibration.recalibration import Metrics
-from training.regressors.gaussian_regressor import FeatureSubset
 from training.set_posterior.error_scales import ErrorScales
 from training.set_posterior.validation import SetFigures, table_of
 from training.train import TrainedModel
@@ -107,7 +106,11 @@ def _summary(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]:
     """What is estimated from what, and by which regressors."""
     outputs = _enumerate(o["name"].replace("_", " ") for o in json.loads(metadata["outputs"]))
     inputs = _enumerate(i["name"] for i in json.loads(metadata["inputs"]))
-    regressors = ", ".join(_describe(member.regressor) for member in trained.members)
+    used = [member.regressor for member in trained.members]
+    settings = [one.model.fitted_settings() for one in used]
+    regressors = ", ".join(
+        f"{one.name} ({own})" if own else one.name for one, own in zip(used, settings, strict=True)
+    )
     text = f"Estimates {outputs} from one reading of {inputs}. Regressors: {regressors}."
     if len(trained.members) > 1:
         text += " They are fused by the covariance of their errors."
@@ -156,11 +159,6 @@ def _provenance(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]
         f"spread; opset {metadata['opset']}, IR {metadata['ir_version']}",
         f"- soilml {metadata['soilml_version']}",
     ]
-
-
-def _describe(regressor: FeatureSubset) -> str:
-    settings = regressor.model.fitted_settings()
-    return f"{regressor.name} ({settings})" if settings else regressor.name
 
 
 def _enumerate(words: Iterable[str]) -> str:

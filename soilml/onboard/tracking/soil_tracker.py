@@ -21,6 +21,7 @@ from soilml.onboard.tracking.misfit import (
     CHANGE_QUANTILE,
     ERROR_DEGREES,
     MOST_VARIANCE,
+    ROWS_JUDGED,
     JointFit,
     Rows,
     chi_squared_limit,
@@ -238,7 +239,8 @@ class SoilTracker:
             return self._answer(Event.UNUSABLE, words)
         misfit = fit.misfit - before.misfit
         limit = self._excess(before.misfit, before.readings) * chi_squared_limit(readings)
-        state = self._filter.with_increase(over_median(misfit, readings))
+        increases = (*self._filter.increases, over_median(misfit, readings))
+        state = replace(self._filter, increases=increases[-ROWS_JUDGED:])
         if misfit > limit and window.blocks:
             question = state.question.with_row(row, True)
             self._filter = replace(state, question=question)
@@ -262,7 +264,9 @@ class SoilTracker:
         block = window.least_known
         if block is None or len(window.blocks) < 2:
             return
-        fit = fit_rows(self._judge, window.rows_of(block), window.without(block))
+        fit = fit_rows(
+            self._judge, window.recent[block - len(window.blocks)].rows, window.without(block)
+        )
         if fit.readings == self._fit.readings:  # rounding may take a reading to the other side
             self._filter = replace(self._filter, window=window.read_again(block, fit.memory))
             self._fit = fit
@@ -306,7 +310,8 @@ class SoilTracker:
             excess = max(excess_noise(apart, self._fit.readings, 2 * unknowns), 1.0)
             limit = excess * chi_squared_limit(unknowns + ERROR_DEGREES, CHANGE_QUANTILE)
             if self._fit.misfit - apart > limit:
-                window = recent.with_another_soil()
+                # what rows added to the misfit was of the other soil
+                window = replace(recent, added=(0.0,) * len(recent.added))
                 self._filter = replace(state, window=window, rows_since_drift=0)
                 self._fit = new
                 words = (
@@ -314,7 +319,7 @@ class SoilTracker:
                     "before, so that soil or sensors drift: these are forgotten"
                 )
                 return self._answer(Event.DRIFT, words)
-        if window.is_full:
+        if window.memory.rows > window.length + window.rows_per_block:
             self._filter = replace(state, window=window.since(1))
             self._fit = fit_memory(self._judge, self._filter.window.memory)
         return self._answer(Event.ACCEPTED, words)
