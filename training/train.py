@@ -12,7 +12,7 @@ from datagen.recipe import parse_recipe
 from soilml.arrays import Floats
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.held_out_errors import HeldOutErrors
-from training.calibration.held_out import common_share, measure_held_out
+from training.calibration.held_out import measure_held_out
 from training.calibration.recalibration import CalibratedRegressor, Metrics
 from training.calibration.training_domain import TrainingDomain
 from training.cross_fit import LeftOut, cross_fit
@@ -51,7 +51,6 @@ class TrainedModel:
     members: tuple[CalibratedRegressor, ...]  # the single regressors
     left_out: LeftOut  # estimates of all rows by fits that have not seen their runs
     errors: HeldOutErrors | None = None  # on rows left out, for targets that differ between rows
-    common_share: Floats | None = None  # of their variance, of repeated readings (q,)
     #: posterior of several rows, where the spec asks for it
     set_posterior: SetPosteriorGraph | None = None
     #: its metrics by number of rows
@@ -119,13 +118,12 @@ def train(
         noise = family.declared_noise()
         set_posterior, set_figures = _train_sets(family, spec.set_posterior, noise, progress)
     found = cross_fit(spec, data, prior, progress)
-    left, errors, share = found.left_out, None, None
+    left, errors = found.left_out, None
     if spec.per_row:
         mean = np.clip(left.mean, prior.lower, prior.upper)
         # with few runs, all rows are kept
         rows = replace(data, run=np.arange(len(data))) if left.few else data
         errors = measure_held_out(mean, left.std, rows)
-        share = common_share(mean, left.std, rows)
     return TrainedModel(
         spec=spec,
         estimator=found.estimator,
@@ -136,7 +134,6 @@ def train(
         members=found.members,
         left_out=left,
         errors=errors,
-        common_share=share,
         set_posterior=set_posterior,
         set_figures=set_figures,
     )

@@ -39,8 +39,8 @@ ONE_RUN = (
 HELD_OUT = (
     "The file has its errors on {rows} rows left out: fused with another file that was trained "
     "from the same data, it is weighed by the correlation of their errors, and the interval is "
-    "calibrated for the pair. Repeated readings of one soil at one slip and load share so much of "
-    "the variance of their error, which does not average out: {shares}."
+    "calibrated for the pair. Repeated readings of one soil at one slip and load share most "
+    "of their error, which does not average out."
 )
 SET_POSTERIOR = (
     "Several readings of one soil by the set posterior (`run`, `step`): the exact likelihood of "
@@ -85,10 +85,8 @@ def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) ->
         if (carried := trained.set_posterior.response.carried) < 1.0:
             lines += [CARRIED.format(carried), ""]
         lines += [*trained.set_posterior.scales.for_card(), ""]
-    elif trained.errors is not None and trained.common_share is not None:
-        parts = zip(targets, trained.common_share, strict=True)
-        shares = ", ".join(f"{target} {share:.0%}" for target, share in parts)
-        lines += [HELD_OUT.format(rows=len(trained.errors.rows), shares=shares), ""]
+    elif trained.errors is not None:
+        lines += [HELD_OUT.format(rows=len(trained.errors.rows)), ""]
     lines += ["## Made by", "", *_provenance(trained, metadata), ""]
     return "\n".join(lines)
 
