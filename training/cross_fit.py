@@ -11,7 +11,7 @@ from scipy.stats import t as student
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
-from soilml.onboard.estimate import PriorSummary
+from soilml.onboard.gaussian_product import PriorSummary
 from training.calibration.recalibration import (
     CalibratedRegressor,
     Metrics,

@@ -103,11 +103,6 @@ class Dataset:
         order = order[np.argsort(self.run[order], kind="stable")]
         return np.split(order, np.flatnonzero(np.diff(self.run[order])) + 1)
 
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Unit of each target."""
-        return tuple(QUANTITIES[name].unit for name in self.target_names)
-
 
 def read_dataset(
     path: str | os.PathLike[str], features: Sequence[str], targets: Sequence[str]

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.onboard.features import as_numbers
-from soilml.onboard.gaussian_product import gaussian_product
+from soilml.onboard.gaussian_product import PriorSummary, gaussian_product, narrowed
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.set_contract import Floats
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90, column
@@ -54,16 +53,6 @@ _WORDS = {
     Reason.CONTRADICTORY: "the files contradict each other",
 }
 _NOT_GIVEN: NDArray[Any] = np.zeros(0)  # Stands for a field that follows from the others
-
-
-@dataclass(frozen=True)
-class PriorSummary:
-    """Mean, standard deviation and range of each quantity before any measurement, each (q,)."""
-
-    mean: Floats
-    std: Floats
-    lower: Floats
-    upper: Floats
 
 
 @dataclass(frozen=True, repr=False)
@@ -290,20 +279,8 @@ class Estimate(Result):
         >>> print(f"{wide['cohesion'][1]:.0f} Pa, {narrow['cohesion'][1]:.0f} Pa")
         720 Pa, 172 Pa
         """
-        lower, upper = self.prior.lower.copy(), self.prior.upper.copy()
-        for name, ends in box.items():
-            unit, given = self[name].unit, as_numbers(name, ends)
-            i = self.names.index(name)
-            if given.shape != (2,):
-                raise InputError(f"{name} within {ends!r}; needed are two values, (least, largest)")
-            low, high = given
-            if not lower[i] <= low < high <= upper[i]:
-                raise InputError(
-                    f"{name} within {low:g} to {high:g} {unit}; needed are two values in "
-                    f"order within the prior, {lower[i]:g} to {upper[i]:g} {unit}"
-                )
-            lower[i], upper[i] = low, high
-        prior = PriorSummary(0.5 * (lower + upper), (upper - lower) / math.sqrt(12.0), lower, upper)
+        prior = narrowed(self.prior, self.names, self.units, box)
+        lower, upper = prior.lower, prior.upper
         beyond = np.maximum(lower - self.mean, self.mean - upper) > CONTRADICTION * self.std
         informed = self.in_range | (self.reason == Reason.INCONSISTENT)
         contradicted = informed & beyond.any(axis=-1)

@@ -9,13 +9,12 @@ from functools import cached_property
 from typing import Any, NoReturn, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.onboard.estimate import Estimate, PriorSummary
+from soilml.onboard.estimate import Estimate
 from soilml.onboard.exact_check import with_exact_check
 from soilml.onboard.features import flatten_readings, without_copies
-from soilml.onboard.gaussian_product import gaussian_product
+from soilml.onboard.gaussian_product import PriorSummary, gaussian_product
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.memory import Memory, check_memory, memory_identity
 from soilml.onboard.metadata import read_fields, read_prior, read_probe
@@ -26,7 +25,7 @@ from soilml.onboard.set_contract import (
     REQUIRED_READINGS,
     Floats,
 )
-from soilml.onboard.set_posterior import SetPosterior, estimate_of_set
+from soilml.onboard.set_posterior import SetPosterior, of_reason
 from soilml.quantities import Z_90
 
 NoiseModels = Mapping[str, tuple[float, float]]
@@ -162,20 +161,26 @@ class Estimator:
             each = (self._set_estimate(row, sets.start())[0] for row in single)
             return Estimate.stack(each, shape)
         flat, shape = flatten_readings(self.inputs, measured)
-        rows = dict(zip(self.inputs, flat, strict=True))
-        found = run_rows(self.session, rows)
-        q = len(self.names)
+        with np.errstate(over="ignore", under="ignore"):  # beyond float32 is out of range
+            feed = dict(zip(self.inputs, np.array(flat, np.float32), strict=True))
+        pieces = []
+        for first in range(0, max(len(flat[0]), 1), ROWS_PER_CALL):
+            part = {name: values[first : first + ROWS_PER_CALL] for name, values in feed.items()}
+            pieces.append(self.session.run(ROW_OUTPUTS, part))
+        joined = pieces[0] if len(pieces) == 1 else map(np.concatenate, zip(*pieces, strict=True))
+        mean, std, covariance, in_range = joined
+        q, load = len(self.names), dict(zip(self.inputs, flat, strict=True)).get("load")
         return Estimate.gaussian(
             self.names,
             self.units,
             self.prior,
-            found["mean"].reshape(*shape, q),
-            found["covariance"].reshape(*shape, q, q),
-            found["std"].reshape(*shape, q),
-            found["in_range"].reshape(shape),
+            mean.astype(np.float64).reshape(*shape, q),
+            covariance.astype(np.float64).reshape(*shape, q, q),
+            std.astype(np.float64).reshape(*shape, q),
+            in_range.reshape(shape),
             self.coverage_factor,
             self.errors,
-            rows["load"].reshape(shape) if "load" in rows else None,
+            None if load is None else load.reshape(shape),
         )
 
     def run(self, **measured: Any) -> Estimate:
@@ -297,8 +302,17 @@ class Estimator:
         """
         sets = self._configured_sets
         found, memory = sets.update(self.session, rows, memory)
-        head = self.names, self.units, self.prior
-        return estimate_of_set(*head, found, memory, sets.least_share_in_range), memory
+        mean, std, covariance, low, high = (x.astype(np.float64) for x in found[:5])
+        in_range, (_, count, used) = bool(found[5][0]), memory.counts.tolist()
+        estimate = Estimate(
+            *(self.names, self.units, mean, std, covariance, low, high, np.asarray(in_range)),
+            self.prior,
+            misfit=np.asarray(float(found[6][0])),
+            rows_used=np.asarray(int(used)),
+            rows_set_aside=np.asarray(int(count - used)),
+            reason=np.asarray(int(of_reason(in_range, memory, sets.least_share_in_range))),
+        )
+        return estimate, memory
 
     def __deepcopy__(self, memo: object = None) -> Estimator:
         """The estimator itself, which nothing changes."""
@@ -327,25 +341,6 @@ class Estimator:
         deviations = np.abs(answer.mean - np.asarray(mean)), np.abs(answer.std - np.asarray(std))
         agree = all(bool(np.all(part < tolerance * answer.prior_std)) for part in deviations)
         return np.array_equal(answer.in_range, in_range) and agree
-
-
-def run_rows(session: Session, rows: Mapping[str, Floats]) -> dict[str, NDArray[Any]]:
-    """Mean and std (m, q), covariance (m, q, q), float64, and the flag in_range (m,).
-
-    session: Of the file.
-    rows: Readings (m,) by input name.
-    """
-    with np.errstate(over="ignore", under="ignore"):  # beyond float32 is out of range
-        feed = dict(zip(rows, np.array(list(rows.values()), np.float32), strict=True))
-    count = len(next(iter(feed.values())))
-    pieces = [
-        session.run(ROW_OUTPUTS, {n: v[first : first + ROWS_PER_CALL] for n, v in feed.items()})
-        for first in range(0, max(count, 1), ROWS_PER_CALL)
-    ]
-    joined = pieces[0] if len(pieces) == 1 else map(np.concatenate, zip(*pieces, strict=True))
-    mean, std, covariance, in_range = joined
-    values = (mean.astype(np.float64), std.astype(np.float64), covariance.astype(np.float64))
-    return dict(zip(ROW_OUTPUTS, (*values, in_range), strict=True))
 
 
 def _product_of_rows(single: Estimate) -> Estimate:

@@ -2,17 +2,52 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from soilml.errors import InputError
+from soilml.onboard.features import as_numbers
 from soilml.onboard.set_contract import Floats
-
-if TYPE_CHECKING:
-    from soilml.onboard.estimate import PriorSummary
 
 #: Least ratio of an estimate's standard deviation to the prior's, along any direction.
 LEAST_STD_RATIO = 1e-3
+
+
+@dataclass(frozen=True)
+class PriorSummary:
+    """Mean, standard deviation and range of each quantity before any measurement, each (q,)."""
+
+    mean: Floats
+    std: Floats
+    lower: Floats
+    upper: Floats
+
+
+def narrowed(
+    prior: PriorSummary,
+    names: Sequence[str],
+    units: Sequence[str],
+    box: Mapping[str, tuple[float, float]],
+) -> PriorSummary:
+    """A prior that is uniform in a box; raises `InputError` for ends not in it and in order."""
+    lower, upper = prior.lower.copy(), prior.upper.copy()
+    for name, ends in box.items():
+        if name not in names:
+            raise InputError(f"{name!r} is not estimated; there are: {', '.join(names)}")
+        i, given = names.index(name), as_numbers(name, ends)
+        if given.shape != (2,):
+            raise InputError(f"{name} within {ends!r}; needed are two values, (least, largest)")
+        low, high = given
+        if not lower[i] <= low < high <= upper[i]:
+            raise InputError(
+                f"{name} within {low:g} to {high:g} {units[i]}; needed are two values in "
+                f"order within the prior, {lower[i]:g} to {upper[i]:g} {units[i]}"
+            )
+        lower[i], upper[i] = low, high
+    return PriorSummary(0.5 * (lower + upper), (upper - lower) / math.sqrt(12.0), lower, upper)
 
 
 def gaussian_product(

@@ -51,11 +51,6 @@ class RowWindow:
     added: tuple[float, ...] = ()
     recent: tuple[RecentRows, ...] = ()
 
-    @staticmethod
-    def empty(start: Memory, length: int) -> RowWindow:
-        """A window that remembers between `length` rows and a block more."""
-        return RowWindow((), start, length)
-
     @property
     def rows_per_block(self) -> int:
         """Rows after which another block begins, but for the last rows."""

@@ -10,6 +10,7 @@ from typing import Any, final
 import numpy as np
 
 from soilml.errors import InputError
+from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.exact_check import with_exact_check
@@ -21,17 +22,15 @@ from soilml.onboard.tracking.misfit import (
     CHANGE_QUANTILE,
     ERROR_DEGREES,
     MOST_VARIANCE,
+    QUANTILE,
     ROWS_JUDGED,
     JointFit,
     Rows,
-    chi_squared_limit,
     excess_noise,
     fit_memory,
     fit_rows,
     judging,
-    over_median,
     usual_excess,
-    with_noise,
 )
 from soilml.onboard.tracking.row_window import RowWindow
 from soilml.onboard.tracking.state_file import packed_state, unpacked_state
@@ -147,7 +146,7 @@ class SoilTracker:
         self._judge = judging(estimator)
         self._estimated = None
         self._empty = estimator.start()
-        self._begin(FilterState(RowWindow.empty(self._empty, self.length)))
+        self._begin(FilterState(RowWindow((), self._empty, self.length)))
 
     def read(self, **measured: float) -> TrackerState:
         """The state after one more row.
@@ -177,7 +176,7 @@ class SoilTracker:
 
     def restart(self) -> TrackerState:
         """Forget all rows, because the soil is known to be another one."""
-        self._begin(FilterState(RowWindow.empty(self._empty, self.length)))
+        self._begin(FilterState(RowWindow((), self._empty, self.length)))
         return self.state
 
     def save(self) -> bytes:
@@ -238,8 +237,9 @@ class SoilTracker:
             words = "slip, load or noise are out of the range of the file: not used"
             return self._answer(Event.UNUSABLE, words)
         misfit = fit.misfit - before.misfit
-        limit = self._excess(before.misfit, before.readings) * chi_squared_limit(readings)
-        increases = (*self._filter.increases, over_median(misfit, readings))
+        limit = chi_squared_quantile(readings, QUANTILE)
+        limit *= self._excess(before.misfit, before.readings)
+        increases = (*self._filter.increases, misfit / chi_squared_quantile(readings, 0.0))
         state = replace(self._filter, increases=increases[-ROWS_JUDGED:])
         if misfit > limit and window.blocks:
             question = state.question.with_row(row, True)
@@ -278,7 +278,7 @@ class SoilTracker:
             fit = fit_rows(self._judge, rows, self._empty)
             degrees = max(fit.readings - len(self.estimator.names), 1.0)
             excess = self._excess(self._fit.misfit, self._fit.readings)
-            agree = fit.misfit <= excess * chi_squared_limit(degrees)
+            agree = fit.misfit <= excess * chi_squared_quantile(degrees, QUANTILE)
             if agree or question.in_succession >= GIVE_UP_AFTER:
                 return self._begin_with(rows, fit, agree)
         return self._answer(
@@ -288,7 +288,7 @@ class SoilTracker:
     def _begin_with(self, rows: Rows, fit: JointFit, agree: bool) -> TrackerState:
         """Forget all but some rows in question."""
         count, earlier = len(rows["slip"]), self._filter.window.memory.rows
-        window = RowWindow.empty(self._empty, self.length).with_rows(rows, fit.memory)
+        window = RowWindow((), self._empty, self.length).with_rows(rows, fit.memory)
         self._filter = self._filter.of_another_soil(window)
         self._fit = fit
         each_other = "agree" if agree else "do not agree either"
@@ -308,7 +308,7 @@ class SoilTracker:
             unknowns = len(self.estimator.names)
             # not that of the last rows one by one, which another soil raises
             excess = max(excess_noise(apart, self._fit.readings, 2 * unknowns), 1.0)
-            limit = excess * chi_squared_limit(unknowns + ERROR_DEGREES, CHANGE_QUANTILE)
+            limit = excess * chi_squared_quantile(unknowns + ERROR_DEGREES, CHANGE_QUANTILE)
             if self._fit.misfit - apart > limit:
                 # what rows added to the misfit was of the other soil
                 window = replace(recent, added=(0.0,) * len(recent.added))
@@ -354,7 +354,8 @@ class SoilTracker:
         """From the rows that are remembered, with errors of the model and noise as rows show it."""
         memory, variance = self._filter.window.memory, self._filter.variance
         if self._estimated is None or self._estimated[0] is not memory:
-            fit = fit_memory(self.estimator, with_noise(memory, variance))
+            noisy = replace(memory, system=memory.system / np.sqrt(variance))
+            fit = fit_memory(self.estimator, noisy)
             sets, session = self.estimator.sets, self.estimator.session
             assert sets is not None
             checked = with_exact_check(fit.estimate, sets, session, memory, self._fit.estimate)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from training.calibration.held_out import measure_held_out
+from training.calibration.recalibration import measure_held_out
 from training.dataset import Dataset
 
 
