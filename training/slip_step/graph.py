@@ -114,7 +114,11 @@ class _Step:
         )  # fmt: skip
         grounds = concat([after, *means, *covs], 1)
         row = constant(self.graph, self.filter.of_row[:, None])
-        speed = self._ratio_at(place + error * row / rise) * rim.max(0, True)
+        m = len(self.table.slip)
+        moved = (place + error * row / rise).clip(0.0, float(m - 1))
+        near = (1.0 - absolute(moved - constant(self.graph, np.arange(m)[None]))).clip(0.0)
+        ratio = (near * constant(self.graph, self.ratio[None])).sum(1, True)  # at that place
+        speed = ratio * rim.max(0, True)
         floor = constant(self.graph, self.table.floor[:, None].astype(float))
         no_soil = (after * floor).sum(0, True).reshape(1)
         beyond = (after * as_float(missing > 0.0)).sum(0, True).reshape(1)
@@ -159,12 +163,6 @@ class _Step:
         missing = where(known > 0.5, 0.0 * rise, needed - pull.max(1, True))
         place = (hot * constant(self.graph, np.arange(m - 1)[None])).sum(1, True) + share
         return hot, share, missing, rise, place
-
-    def _ratio_at(self, place: Value) -> Value:
-        """Travel over rolling (n, 1) at places of the table."""
-        m = len(self.table.slip)
-        away = absolute(place.clip(0.0, float(m - 1)) - constant(self.graph, np.arange(m)[None]))
-        return ((1.0 - away).clip(0.0) * constant(self.graph, self.ratio[None])).sum(1, True)
 
     def _speeds(self, weight: Value, speed: Value) -> tuple[list[Value], list[Value]]:
         """Mean and standard deviation (1,) of the speed, and its quantiles, rising."""

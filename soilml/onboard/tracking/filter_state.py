@@ -155,14 +155,3 @@ class FilterState:
     rows_since_change: int = 0
     rows_since_drift: int = -1
     variance: float = 1.0
-
-    def of_another_soil(self, window: RowWindow) -> FilterState:
-        """The state with rows of another soil alone; the size of the model error is kept."""
-        kept = len(self.increases) - len(self.question.rows)
-        return FilterState(
-            window,
-            repeated=self.repeated,
-            increases=self.increases[: max(kept, 0)],
-            rows_since_change=window.memory.rows,
-            variance=self.variance,
-        )

@@ -85,10 +85,6 @@ class RowWindow:
             return None
         return len(self.blocks) - len(known) + known.index(min(known))
 
-    def without(self, block: int) -> Memory:
-        """The memory of all rows but those of one block, which is not the only one."""
-        return join((*self.blocks[:block], *self.blocks[block + 1 :]))
-
     def read_again(self, block: int, after: Memory) -> RowWindow:
         """The window with a recent block as it is in the memory `after`, behind all others.
 
@@ -106,10 +102,6 @@ class RowWindow:
         blocks = self.blocks[block:]
         added, recent = self.added[-len(blocks) :], self.recent[-len(blocks) :]
         return replace(self, blocks=blocks, memory=join(blocks), added=added, recent=recent)
-
-    def before(self, block: int) -> Memory:
-        """The memory of the rows before this block."""
-        return join(self.blocks[:block])
 
     def suspect(self, excess: float) -> int:
         """The block with which another soil begins most likely: the last ones added most.

@@ -32,7 +32,7 @@ from soilml.onboard.tracking.misfit import (
     judging,
     usual_excess,
 )
-from soilml.onboard.tracking.row_window import RowWindow
+from soilml.onboard.tracking.row_window import RowWindow, join
 from soilml.onboard.tracking.state_file import packed_state, unpacked_state
 
 #: After so many rows the last half of the rows is compared with the first, for a slow drift.
@@ -264,9 +264,9 @@ class SoilTracker:
         block = window.least_known
         if block is None or len(window.blocks) < 2:
             return
-        fit = fit_rows(
-            self._judge, window.recent[block - len(window.blocks)].rows, window.without(block)
-        )
+        others = join((*window.blocks[:block], *window.blocks[block + 1 :]))
+        as_read = window.recent[block - len(window.blocks)].rows
+        fit = fit_rows(self._judge, as_read, others)
         if fit.readings == self._fit.readings:  # rounding may take a reading to the other side
             self._filter = replace(self._filter, window=window.read_again(block, fit.memory))
             self._fit = fit
@@ -289,7 +289,15 @@ class SoilTracker:
         """Forget all but some rows in question."""
         count, earlier = len(rows["slip"]), self._filter.window.memory.rows
         window = RowWindow((), self._empty, self.length).with_rows(rows, fit.memory)
-        self._filter = self._filter.of_another_soil(window)
+        state = self._filter  # the size of the model error is kept
+        kept = max(len(state.increases) - len(state.question.rows), 0)
+        self._filter = FilterState(
+            window,
+            repeated=state.repeated,
+            increases=state.increases[:kept],
+            rows_since_change=window.memory.rows,
+            variance=state.variance,
+        )
         self._fit = fit
         each_other = "agree" if agree else "do not agree either"
         words = f"the last {count} rows {each_other} with each other, and not with {earlier} before"
@@ -302,7 +310,7 @@ class SoilTracker:
         first = self._split(window)
         if 0 < first < blocks:
             recent = window.since(first)
-            old = fit_memory(self._judge, window.before(first))
+            old = fit_memory(self._judge, join(window.blocks[:first]))
             new = fit_memory(self._judge, recent.memory)
             apart = old.misfit + new.misfit
             unknowns = len(self.estimator.names)
