@@ -93,10 +93,6 @@ class Dataset:
             row=self.row[index],
         )
 
-    def rows_of_each_run(self, most: int = 2) -> NDArray[np.int64]:
-        """Indices of at most `most` rows of each run, whose errors are correlated."""
-        return np.sort(np.concatenate([run[:most] for run in self.runs()]))
-
     def runs(self) -> list[NDArray[np.int64]]:
         """Row indices of each run, shuffled.
 
@@ -106,11 +102,6 @@ class Dataset:
         order = np.random.default_rng(0).permutation(len(self))
         order = order[np.argsort(self.run[order], kind="stable")]
         return np.split(order, np.flatnonzero(np.diff(self.run[order])) + 1)
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Unit of each target."""
-        return tuple(QUANTITIES[name].unit for name in self.target_names)
 
 
 def read_dataset(

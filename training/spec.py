@@ -91,11 +91,6 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
     for k in set(range(len(features))) - used:
         settings.fail(f"features: no regressor reads {features[k]!r}; remove it")
     response = take_response_settings(settings, seed) if "set_posterior" in settings else None
-    if "rule" in settings:
-        settings.fail(
-            "rule is no setting any more: regressors are always fused by the correlation of their "
-            "errors, as by the former 'best-linear'; remove this line"
-        )
     settings.finish()
     return Spec(
         name=file.stem,

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from datagen.recipe import parse_recipe
 from soilml.arrays import Floats
-from soilml.onboard.estimate import PriorSummary
+from soilml.onboard.gaussian_product import PriorSummary
 from soilml.onboard.held_out_errors import HeldOutErrors
-from training.calibration.held_out import common_share, measure_held_out
-from training.calibration.recalibration import CalibratedRegressor, Metrics
+from training.calibration.recalibration import measure_held_out
 from training.calibration.training_domain import TrainingDomain
-from training.cross_fit import LeftOut, cross_fit
+from training.cross_fit import CrossFit, cross_fit
 from training.dataset import Dataset
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.families.wheel_family import WheelFamily
@@ -28,7 +27,7 @@ from training.set_posterior.validation import (
     validate_posterior,
     with_misfit_limits,
 )
-from training.spec import AnyWheelSpec, Spec
+from training.spec import Spec
 
 Progress = Callable[[str, int, int], None]
 
@@ -38,20 +37,14 @@ TrainedSetPosterior = tuple[SetPosteriorGraph, dict[int, SetFigures]]
 
 
 @dataclass(frozen=True)
-class TrainedModel:
+class TrainedModel(CrossFit):
     """A trained model, what its file needs, and its metrics on rows left out."""
 
     spec: Spec  # what it was trained from
-    estimator: CalibratedRegressor  # the only regressor, or the ensemble of all
     domain: TrainingDomain  # where estimates are in range
     prior: PriorSummary  # prior of the targets
     data: Dataset
-    #: of single rows: of each member, and of the estimator
-    scores: dict[str, Metrics]
-    members: tuple[CalibratedRegressor, ...]  # the single regressors
-    left_out: LeftOut  # estimates of all rows by fits that have not seen their runs
     errors: HeldOutErrors | None = None  # on rows left out, for targets that differ between rows
-    common_share: Floats | None = None  # of their variance, of repeated readings (q,)
     #: posterior of several rows, where the spec asks for it
     set_posterior: SetPosteriorGraph | None = None
     #: its metrics by number of rows
@@ -117,40 +110,30 @@ def train(
     if spec.set_posterior is not None:
         family = RecipeFamily.of(parse_recipe(data.recipe, "recipe of the data"), spec.targets)
         noise = family.declared_noise()
-        set_posterior, set_figures = _train_sets(family, spec.set_posterior, noise, progress)
+        set_posterior, set_figures = train_sets(family, spec.set_posterior, noise, progress)
     found = cross_fit(spec, data, prior, progress)
-    left, errors, share = found.left_out, None, None
+    left, errors = found.left_out, None
     if spec.per_row:
         mean = np.clip(left.mean, prior.lower, prior.upper)
         # with few runs, all rows are kept
         rows = replace(data, run=np.arange(len(data))) if left.few else data
         errors = measure_held_out(mean, left.std, rows)
-        share = common_share(mean, left.std, rows)
     return TrainedModel(
+        **vars(found),
         spec=spec,
-        estimator=found.estimator,
         domain=TrainingDomain.of(data.features, spec.features, spec.seed, left.few),
         prior=prior,
         data=data,
-        scores=found.scores,
-        members=found.members,
-        left_out=left,
         errors=errors,
-        common_share=share,
         set_posterior=set_posterior,
         set_figures=set_figures,
     )
 
 
-def train_any_wheel(spec: AnyWheelSpec, progress: Progress) -> TrainedSetPosterior:
-    """The set posterior of wheels of any size, and its metrics on fresh simulated sets."""
-    return _train_sets(spec.family, spec.response, spec.noise, progress)
-
-
-def _train_sets(
+def train_sets(
     family: WheelFamily, settings: ResponseSettings, noise: FileNoise, progress: Progress
 ) -> TrainedSetPosterior:
-    """The set posterior of a family, and its metrics; `noise` is the file's own."""
+    """The set posterior of a family, and its metrics on fresh sets; `noise` is the file's own."""
     posterior = SetPosteriorGraph(
         family, fit_response(family, settings, progress), NO_LIMITS, noise, settings.small,
         settings.scales, settings.sensor_errors,

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
+from soilml.onboard.gaussian_product import PriorSummary, gaussian_product, narrowed
 from soilml.onboard.held_out_errors import HeldOutErrors
-from soilml.onboard.narrower_prior import LEAST_MASS, box_ends, within_box
 from soilml.onboard.set_contract import Floats
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90, column
 from soilml.results import LEVEL, EstimatedValue, Result, ends_at
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: A mean closer to an end of the prior than so many standard deviations is at the edge.
 EDGE_STDS = 1.5
+#: A mean that lies this many standard deviations beyond a narrower prior contradicts it.
+CONTRADICTION = 3.72
 
 
 class Reason(IntEnum):
@@ -51,16 +53,6 @@ _WORDS = {
     Reason.CONTRADICTORY: "the files contradict each other",
 }
 _NOT_GIVEN: NDArray[Any] = np.zeros(0)  # Stands for a field that follows from the others
-
-
-@dataclass(frozen=True)
-class PriorSummary:
-    """Mean, standard deviation and range of each quantity before any measurement, each (q,)."""
-
-    mean: Floats
-    std: Floats
-    lower: Floats
-    upper: Floats
 
 
 @dataclass(frozen=True, repr=False)
@@ -268,9 +260,10 @@ class Estimate(Result):
         Returns
         -------
         Estimate
-            Its `prior` is the narrower one. Where hardly any of the estimate lies in the box, the
-            readings contradict it: `in_range` is false, and the answer is the narrower prior, as it
-            is where the estimate was the prior.
+            Its `prior` is the narrower one, whose mean and covariance take the place of the wider
+            one's (`gaussian_product`). Where a mean is `CONTRADICTION` standard deviations beyond
+            the box, the readings contradict it: `in_range` is false, and the answer is the narrower
+            prior, as it is where the estimate was the prior.
 
         Raises
         ------
@@ -284,26 +277,28 @@ class Estimate(Result):
         >>> wide = estimator.run(slip=[0.1, 0.3], torque=[1.6, 2.7], load=[60.0, 60.0])
         >>> narrow = wide.within(cohesion=(200.0, 800.0))
         >>> print(f"{wide['cohesion'][1]:.0f} Pa, {narrow['cohesion'][1]:.0f} Pa")
-        720 Pa, 173 Pa
+        720 Pa, 172 Pa
         """
-        lower, upper = box_ends(self.names, self.units, (self.prior.lower, self.prior.upper), box)
-        prior = PriorSummary(0.5 * (lower + upper), (upper - lower) / math.sqrt(12.0), lower, upper)
-        given = Estimate.from_prior(self.names, self.units, prior, np.shape(self.in_range))
-        outer = (self.prior.lower, self.prior.upper)
-        arrays: dict[str, Any] = {key: np.array(getattr(self, key)) for key in Estimate.ARRAYS}
+        prior = narrowed(self.prior, self.names, self.units, box)
+        lower, upper = prior.lower, prior.upper
+        beyond = np.maximum(lower - self.mean, self.mean - upper) > CONTRADICTION * self.std
+        informed = self.in_range | (self.reason == Reason.INCONSISTENT)
+        contradicted = informed & beyond.any(axis=-1)
+        found = Estimate.from_prior(self.names, self.units, prior, np.shape(self.in_range))
         for at in np.ndindex(np.shape(self.in_range)):
-            found: Any = given
-            if self.in_range[at] or self.reason[at] == Reason.INCONSISTENT:
-                interval = np.stack([self.low[at], self.high[at]])
-                found = within_box(
-                    self.mean[at], self.covariance[at], interval, outer, (lower, upper)
+            if informed[at] and not contradicted[at]:
+                found.mean[at], found.covariance[at] = gaussian_product(
+                    self.mean[at][None], self.covariance[at][None], self.prior, after=prior
                 )
-                if found.mass < LEAST_MASS:
-                    found, arrays["reason"][at] = given, int(Reason.INCONSISTENT)
-            for key in ("mean", "std", "covariance", "low", "high"):
-                arrays[key][at] = getattr(found, key)[at if found is given else ...]
-            arrays["in_range"][at] &= found is not given
-        return replace(self, prior=prior, **arrays)
+        found = Estimate.gaussian(
+            *(self.names, self.units, prior, np.clip(found.mean, lower, upper), found.covariance),
+            np.sqrt(np.diagonal(found.covariance, axis1=-2, axis2=-1)),
+            np.asarray(self.in_range & ~contradicted),
+            np.full(len(self.names), Z_90),
+        )
+        changed: Any = {key: getattr(found, key) for key in ("prior", *Estimate.ARRAYS[:6])}
+        changed["reason"] = np.where(contradicted, Reason.INCONSISTENT, self.reason)
+        return replace(self, **changed)
 
     def __getitem__(self, name: str) -> EstimatedValue:
         """One quantity (...), which unpacks to mean and standard deviation.

@@ -147,17 +147,12 @@ def _measure(truth: Floats, mean: Floats, std: Floats) -> JointErrors:
         high=np.asarray([max(_quantile(residual[piece], 0.95), 0.0) for piece in pieces]),
     )
     # an interval that contains its mean, and is interpolated between bins, covers more than 90 %
-    factor = _reach(rule, truth, fused, scale * spread)
+    low, high = rule.interval(fused, scale * spread)
+    side = np.maximum(np.where(truth < fused, fused - low, high - fused), 1e-9 * scale * spread)
+    factor = _quantile(np.abs(truth - fused) / side, 0.9)
     if few:  # Student's 95 % quantile over the Gaussian one, to first order
         factor *= 1.0 + (Z_90**2 + 1.0) / (4.0 * (len(truth) - len(mean)))
     return replace(rule, low=factor * rule.low, high=factor * rule.high)
-
-
-def _reach(rule: JointErrors, truth: Floats, mean: Floats, std: Floats) -> float:
-    """Factor on a rule's interval with which it covers 90 % of the true values (n,)."""
-    low, high = rule.interval(mean, std)
-    side = np.where(truth < mean, mean - low, high - mean)
-    return _quantile(np.abs(truth - mean) / np.maximum(side, 1e-9 * std), 0.9)
 
 
 def _disagreement(mean: Floats, std: Floats, correlation: Floats) -> Floats:

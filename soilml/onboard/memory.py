@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -66,16 +66,8 @@ class Memory:
 
     def sealed(self) -> Memory:
         """This memory with the checksum of its content."""
-        return replace(self, checksum=state_checksum(*self._parts()))
-
-    @property
-    def is_sealed(self) -> bool:
-        """Whether the content is that of the checksum."""
-        return self.checksum == state_checksum(*self._parts())
-
-    def _parts(self) -> Iterator[object]:
-        yield self.file
-        yield from (np.asarray(self.system, np.float64), np.asarray(self.counts, np.float32))
+        parts = np.asarray(self.system, np.float64), np.asarray(self.counts, np.float32)
+        return replace(self, checksum=state_checksum(self.file, *parts))
 
     @property
     def rows(self) -> int:
@@ -134,6 +126,6 @@ def check_memory(memory: object, columns: int, identity: str, path: str) -> Memo
             f"this memory is damaged: its system has shape {system.shape}; needed are finite "
             f"numbers of shape (rows, {columns}): {begin}"
         )
-    if not memory.is_sealed:
+    if memory.checksum != memory.sealed().checksum:
         raise InputError(f"this memory is damaged: its checksum does not match: {begin}")
     return memory

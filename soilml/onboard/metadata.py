@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.features import READABLE
+from soilml.onboard.gaussian_product import PriorSummary
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.set_contract import INFERRED, MODEL_ERROR_INPUT
 from soilml.onboard.set_posterior import SetPosterior
@@ -28,19 +28,15 @@ _PRIOR = ("prior_mean", "prior_std", "lower", "upper")
 def read_fields(metadata: Mapping[str, str]) -> dict[str, Any]:
     """Fields of an `Estimator` from the metadata of its file, by field name.
 
-    Raises `ValueError` where an entry is missing or malformed.
+    Raises one of `model_file.DAMAGED` where an entry is missing or malformed.
     """
-    try:
-        return _read_fields(metadata)
-    except (AttributeError, KeyError, OverflowError, RecursionError, TypeError) as error:
-        raise ValueError(f"{type(error).__name__}: {error}") from None
-
-
-def _read_fields(metadata: Mapping[str, str]) -> dict[str, Any]:
     inputs = _read_quantities(metadata, "inputs", READABLE)
     outputs = _read_quantities(metadata, "outputs", QUANTITIES)
     _check_provenance(metadata)
-    _check_prior(outputs)
+    for entry in outputs:
+        mean, std, lower, upper = (entry[key] for key in _PRIOR)
+        if not (all(map(_is_number, (mean, std, lower, upper))) and std > 0.0 and lower < upper):
+            raise ValueError("outputs: a prior that is none")
     together = json.loads(metadata["together"])
     factor = np.asarray(together["alone"], np.float64).reshape(-1)
     sets = SetPosterior.of(json.loads(metadata["set"])) if "set" in metadata else None
@@ -99,13 +95,6 @@ def _read_quantities(
     if any(entry["unit"] != QUANTITIES[entry["name"]].unit for entry in entries):
         raise ValueError(f"{key}: a unit that is not that of the quantity")
     return entries
-
-
-def _check_prior(outputs: list[dict[str, Any]]) -> None:
-    for entry in outputs:
-        mean, std, lower, upper = (entry[key] for key in _PRIOR)
-        if not (all(map(_is_number, (mean, std, lower, upper))) and std > 0.0 and lower < upper):
-            raise ValueError("outputs: a prior that is none")
 
 
 def _check_set(sets: SetPosterior) -> None:

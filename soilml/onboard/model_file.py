@@ -36,6 +36,8 @@ _METADATA = 14  # Field metadata_props of a model
 FORMAT = "3"  # Version of the file format: names of inputs and outputs, keys of the metadata
 #: Largest model file, bytes. Those that `soilml train` writes have some MB at most.
 MOST_BYTES = 256 << 20
+#: What the reading of malformed metadata raises.
+DAMAGED = (AttributeError, KeyError, OverflowError, RecursionError, TypeError, ValueError)
 _MOST_SHOWN = 40  # Characters of an entry of the metadata that a message shows
 #: The metadata entry `soilml_kind` of a graph of one step, which other programs feed.
 ONE_STEP = "step"
@@ -137,8 +139,9 @@ def verified(file: Path, read: Callable[[], Opened], passes: Callable[[Opened], 
     try:
         found = read()
         passed = passes(found)
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise ModelFileError(f"{file}: its metadata is damaged ({error})") from None
+    except DAMAGED as error:
+        said = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
+        raise ModelFileError(f"{file}: its metadata is damaged ({said})") from None
     except Exception as error:  # onnxruntime raises many kinds, none with a public base
         raise ModelFileError(f"{file} cannot be run: {' '.join(str(error).split())}") from None
     if not passed:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.onboard.estimate import Estimate, PriorSummary, Reason
+from soilml.onboard.estimate import Estimate, Reason
+from soilml.onboard.gaussian_product import PriorSummary
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.joint_errors import are_comparable, joint_errors
 from soilml.onboard.set_contract import Floats

@@ -6,7 +6,7 @@ is kept in a memory of bounded size, so that a rover can continue where it stopp
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, final
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.onboard.estimate import Estimate, PriorSummary, Reason
+from soilml.onboard.estimate import Reason
 from soilml.onboard.features import READABLE, as_number, as_numbers, flatten_readings
 from soilml.onboard.memory import ROWS_PER_CALL, Memory
 from soilml.onboard.model_file import Session
@@ -122,7 +122,10 @@ class SetPosterior:
 
         Raises `InputError` if a name is not known, or a value is out of the range of the file.
         """
-        parts = {name: _noise_parts(name, value) for name, value in _items("noise", noise)}
+        if not isinstance(noise, Mapping):
+            given = type(noise).__name__
+            raise InputError(f"noise is a {given}; needed is a dict of names to values")
+        parts = {name: _noise_parts(name, value) for name, value in noise.items()}
         values = {name: as_number(name, value) for name, value in context.items()}
         common = {name: values.pop(name) for name in COMMON_ERROR_INPUTS if name in values}
         for name, value in common.items():
@@ -284,12 +287,6 @@ def constant_noise_factor(torque: Floats, constant: float) -> Floats:
     return np.asarray(np.exp(-2.0 * np.minimum(share, MOST_CONSTANT_SHARE) ** 2))
 
 
-def _items(name: str, value: Any) -> list[tuple[Any, Any]]:
-    if not isinstance(value, Mapping):
-        raise InputError(f"{name} is a {type(value).__name__}; needed is a dict of names to values")
-    return list(value.items())
-
-
 def _noise_parts(name: Any, value: Any) -> tuple[float, float]:
     """Constant part and share of a noise; raises `InputError` for anything else."""
     parts = as_numbers(f"noise of {name}", value)
@@ -315,40 +312,6 @@ def _broadcast(name: str, value: Any, shape: tuple[int, ...]) -> Floats:
         if bad.any():
             raise InputError(f"{name} is {array[bad][0]:g}; needed is a finite number, or NaN")
     return array
-
-
-def estimate_of_set(
-    names: tuple[str, ...],
-    units: tuple[str, ...],
-    prior: PriorSummary,
-    outputs: Sequence[Any],
-    memory: Memory,
-    least_share: float,
-) -> Estimate:
-    """The estimate with its reason.
-
-    names, units, prior: As in `Estimate`.
-    outputs: Outputs of the graph in the order of `SET_OUTPUTS`.
-    memory: The memory with these rows.
-    least_share: Share of the rows that must be in range, `SetPosterior.least_share_in_range`.
-    """
-    mean, std, covariance, low, high = (x.astype(np.float64) for x in outputs[:5])
-    in_range, (_, rows, rows_used) = bool(outputs[5][0]), memory.counts.tolist()
-    return Estimate(
-        names=names,
-        units=units,
-        mean=mean,
-        std=std,
-        covariance=covariance,
-        low=low,
-        high=high,
-        in_range=np.asarray(in_range),
-        prior=prior,
-        misfit=np.asarray(float(outputs[6][0])),
-        rows_used=np.asarray(int(rows_used)),
-        rows_set_aside=np.asarray(int(rows - rows_used)),
-        reason=np.asarray(int(of_reason(in_range, memory, least_share))),
-    )
 
 
 def of_reason(in_range: bool, memory: Memory, least_share: float) -> Reason:

@@ -149,7 +149,8 @@ class SlipStream:
 
     def start(self) -> SlipState:
         """The state before any row."""
-        feed = {name: np.zeros(shape, np.float32) for name, shape in self._shapes.items()}
+        inputs = self.session.get_inputs()
+        feed = {entry.name: np.zeros(entry.shape, np.float32) for entry in inputs}
         feed["recent"][1:] = -1.0
         grounds = self.session.run(["start"], feed)[0]
         return SlipState.of(grounds, feed["recent"], self.identity)
@@ -260,7 +261,3 @@ class SlipStream:
             if not (away < PROBE_TOLERANCE).all():
                 return False
         return bool(probe)
-
-    @property
-    def _shapes(self) -> dict[str, list[int]]:
-        return {entry.name: entry.shape for entry in self.session.get_inputs()}

@@ -125,14 +125,12 @@ def estimates_of_table(
     by: str | None = None,
     *,
     adjusted: Callable[[Estimator, dict[str, Any]], dict[str, Any]] = lambda _, readings: readings,
-    box: Mapping[str, tuple[float, float]] | None = None,
     progress: Progress = unseen,
 ) -> TableEstimates:
     """Estimates of all rows by themselves, fused where there are several files, or of groups.
 
     by: Column of whose groups each has one soil, or `all`; only the first file is then used.
     adjusted: Inputs of a file, changed for errors of its model.
-    box: Narrower prior of the estimates of groups.
 
     Raises `TableError` where no row has all readings of a file.
     """
@@ -158,7 +156,13 @@ def estimates_of_table(
     groups = dict(table.rows(usable[0]).groups(by))
     readings = [adjusted(first, joint_readings(first, rows)) for rows in groups.values()]
     with progress(f"estimating by {by}", len(groups)) as done:
-        estimate = _estimates_of_runs(first, readings, box or {}, done)
+
+        def one_by_one() -> Iterator[Estimate]:
+            for number, one in enumerate(readings, 1):
+                yield first.run(**one)
+                done(number)
+
+        estimate = Estimate.stack(one_by_one(), (len(readings),))
     names = [name for name, _ in table.groups(by)]
     place = {name: i for i, name in enumerate(groups)}
     answered = np.asarray([name in place for name in names])
@@ -182,23 +186,6 @@ def _estimates_of_rows(
             getattr(result, key)[index[block]] = getattr(estimate, key)
         done(min(block.stop, index.size))
     return result
-
-
-def _estimates_of_runs(
-    estimator: Estimator,
-    readings: Sequence[Mapping[str, Any]],
-    box: Mapping[str, tuple[float, float]],
-    done: Callable[[int], None],
-) -> Estimate:
-    """Estimates (runs,) from the readings of each run, within a narrower prior if there is one."""
-
-    def one_by_one() -> Iterator[Estimate]:
-        for number, one in enumerate(readings, 1):
-            found = estimator.run(**one)
-            yield found.within(**box) if box else found
-            done(number)
-
-    return Estimate.stack(one_by_one(), (len(readings),))
 
 
 def estimate(rows: Rows, model: Estimator | str | os.PathLike[str], by: str | None = None) -> Any:

@@ -6,7 +6,8 @@ for each wheel a Gaussian of the losses of its drive, so that no soil is drawn a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,8 @@ POWER = 0.2
 #: Largest torque of a wheel over its radius and the heaviest load of the table. No soil carries as
 #: much: what is read above it is no torque, and is left out.
 MOST_TORQUE = 10.0
+TINY = 1e-12  # Smallest divisor
+PAIRS = ((0, 0), (0, 1), (1, 1))  # Of means, whose covariances a belief has
 OUTLIER, OUTLIER_STD = 0.01, 0.3  # Share of glitches, and their error over load and radius
 #: Quantiles that are the ends of the 90 % interval, and the median. Those at 5 and 95 % covered
 #: 79 % of the slips of 22 simulated drives with rims alike, these 90 %: rovers are driven to the
@@ -89,22 +92,22 @@ class SlipFilter:
         """`weight` of the rover, N; `noise` of a torque: N m, and a share of the reading."""
         self.table, self.weight, self.errors = table, weight, errors
         self.noise = noise
-        n, k = table.pull.shape[2], len(table.wheels)
+        n = table.pull.shape[2]
         rng, normal = np.random.default_rng(0), Prior.normal(1.0).at((np.arange(n) + 0.5) / n)
-        self._share = errors.pull_std * rng.permutation(normal)
-        self._row = rng.permutation(normal)
+        self.share = errors.pull_std * rng.permutation(normal)
+        self.of_row = rng.permutation(normal)
         soils = len(table.values)
         self._prior = np.where(table.floor, FLOOR_SHARE / max(n - soils, 1), 1.0 / soils)
         self._prior = self._prior / self._prior.sum()
-        variances = [errors.loss_std**2, 0.0, errors.gain_std**2]
-        self._cov = np.asarray(variances)[:, None, None] * np.ones((3, n, k))
-        self._ratio = travel_ratio(table.slip)
+        self._variances = [float(errors.loss_std**2), 0.0, float(errors.gain_std**2)]
+        self.ratio = travel_ratio(table.slip)
         self.most_torque = MOST_TORQUE * table.load[-1] * table.radius  # (k,), N m
 
     def start(self) -> Belief:
         """The belief before any row."""
-        n, k = self._cov.shape[1:]
-        return Belief(self._prior, np.zeros((2, n, k)), self._cov)
+        size = len(self._prior), len(self.table.wheels)
+        cov = np.asarray(self._variances)[:, None, None] * np.ones((3, *size))
+        return Belief(self._prior, np.zeros((2, *size)), cov)
 
     def step(
         self, belief: Belief, rim_speed: Floats, torque: Floats, load: Floats, slope: float
@@ -117,40 +120,44 @@ class SlipFilter:
         load: Load of each wheel (k,), N, in the range of the table; beyond it that of its end.
         slope: Pitch, rad, positive uphill.
         """
-        rim_speed, apart, kept = self._rims(belief.apart, rim_speed)
+        rim_speed, apart, kept = self.rims(np, np.asarray([belief.apart]), rim_speed)
         pull, own = self._curves(rim_speed, load)
-        place, missing, rise = self._balance(pull, self.weight * (np.sin(slope) + self._share))
-        at, share = place.astype(np.int64), place % 1.0
-        rows = np.arange(len(place))
-        low, high = own[:, rows, at].T, own[:, rows, at + 1].T
-        model = low + share[:, None] * (high - low)
+        place, missing, rise = self._balance(pull, self.weight * (np.sin(slope) + self.share))
+        at, rows = place.astype(np.int64), np.arange(len(place))
         error = self.weight * np.cos(slope) * self.errors.slope_std
-        common = (high - low) / rise[:, None] * error
-        step = np.diff(-self._ratio)[at]
-        spread = ((high - low) / step[:, None] * self.errors.speed_std) ** 2 * kept
-        spread[len(self.table.values) :] = (FLOOR_NOISE * load * self.table.radius) ** 2
-        weight, mean, cov = self._mixed(belief)
-        after, misfit = self._weigh(
-            weight, mean, cov, (torque, model, spread, common, load), missing
-        )
-        moved = np.clip(place + error * self._row / rise, 0.0, len(self._ratio) - 1.0)
-        ratio = np.interp(moved, np.arange(len(self._ratio)), self._ratio)
+        seen = np.abs(torque) <= self.most_torque
+        weight, mean, cov, misfit = self.updated(
+            np, (belief.weight[:, None], list(belief.mean), list(belief.cov)),
+            reading=np.where(seen, torque, 0.0), seen=seen.astype(float), load=load,
+            low=own[:, rows, at].T, high=own[:, rows, at + 1].T, share=place[:, None] % 1.0,
+            rise=rise[:, None], step=np.diff(-self.ratio)[at, None], missing=missing[:, None],
+            kept=kept, error=error,
+        )  # fmt: skip
+        moved = np.clip(place + error * self.of_row / rise, 0.0, len(self.ratio) - 1.0)
+        ratio = np.interp(moved, np.arange(len(self.ratio)), self.ratio)
+        after = Belief(weight[:, 0], np.stack(mean), np.stack(cov), float(apart[0]))
         speed = ratio * rim_speed.max()
-        answer = self._answer(after.weight, speed, rim_speed, missing, misfit)
-        return answer, replace(after, apart=apart)
+        return self._answer(after.weight, speed, rim_speed, missing, float(misfit[0])), after
 
-    def _rims(self, apart: float, rim_speed: Floats) -> tuple[Floats, float, float]:
+    def rims(self, ops: Any, apart: Any, rim_speed: Any) -> tuple[Any, Any, Any]:
         """Rim speeds shrunk to their mean, their variance about it, and the share kept of it.
 
         Where wheels turn alike, readings differ by noise alone, and torques do not follow it. Taken
         at face value, that noise would favour soils whose torque hardly changes with slip. The
         share is that of James and Stein (Efron and Morris, JASA 68, 1973).
+
+        ops: As in `updated`.
+        apart: Variance before the row, over the square of the mean, (1,).
+        rim_speed: (k,).
         """
-        middle = float(rim_speed.mean())
-        now = float(np.var(rim_speed / middle, ddof=1)) if len(rim_speed) > 1 else 0.0
-        apart = now if apart == 0.0 else ROWS_ALIKE * apart + (1.0 - ROWS_ALIKE) * now
-        kept = max(1.0 - self.errors.speed_std**2 / apart, 0.0) if apart > 0.0 else 0.0
-        return middle + kept * (rim_speed - middle), apart, kept
+        middle = rim_speed.mean(axis=0, keepdims=True)
+        away = rim_speed - middle
+        now = squared(away / middle).sum(axis=0, keepdims=True)
+        now = now * (1.0 / max(len(self.table.wheels) - 1, 1))
+        apart = ops.where(apart > 0.0, apart * ROWS_ALIKE + now * (1.0 - ROWS_ALIKE), now)
+        kept = 1.0 - float(self.errors.speed_std**2) / ops.maximum(apart, TINY)
+        kept = ops.maximum(kept, 0.0)
+        return middle + kept * away, apart, kept
 
     def _curves(self, rim_speed: Floats, load: Floats) -> tuple[Floats, Floats]:
         """Pull (n, m) of the rover, N, and torque (k, n, m) of its wheels, N m.
@@ -159,7 +166,7 @@ class SlipFilter:
         """
         table, own = self.table, []
         pull = np.zeros(table.pull.shape[2:])
-        speed = rim_speed.max() * self._ratio
+        speed = rim_speed.max() * self.ratio
         for i, kind in enumerate(table.kind):
             slip = np.clip(slip_of_ratio(speed / rim_speed[i]), table.slip[0], table.slip[-1])
             left, a = _between(table.slip, slip)
@@ -193,63 +200,77 @@ class SlipFilter:
         missing = np.where(known, 0.0, needed - pull.max(axis=1))
         return after - 1 + share, missing, rise
 
-    def _mixed(self, belief: Belief) -> tuple[Floats, Floats, Floats]:
+    def _mixed(self, weight: Any, mean: Any, cov: Any) -> tuple[Any, list[Any], list[Any]]:
         """Weights, means and covariances before a row, on which another soil may have begun."""
-        w, mean, cov = belief.weight, belief.mean, belief.cov
-        stays = (1.0 - CHANGE) * w
-        weight = stays + CHANGE * self._prior
-        same = (stays / weight)[:, None]
-        middle = np.einsum("n,cnk->ck", w, mean)[:, None]
-        apart = mean - middle
-        squares = np.stack([apart[0] ** 2, apart[0] * apart[1], apart[1] ** 2])
-        pooled = np.einsum("n,cnk->ck", w, cov + squares)[:, None]
-        mean = same * mean + (1.0 - same) * middle
-        cov = same * cov + (1.0 - same) * pooled + same * (1.0 - same) * squares
-        return weight, KEPT * mean, KEPT**2 * cov + (1.0 - KEPT**2) * self._cov
+        stays = weight * (1.0 - CHANGE)
+        mixed = stays + CHANGE * self._prior[:, None]
+        same = stays / mixed
+        other = 1.0 - same
+        middle = [(weight * one).sum(axis=0, keepdims=True) for one in mean]
+        apart = [one - of_all for one, of_all in zip(mean, middle, strict=True)]
+        means = [(same * one + other * m) * KEPT for one, m in zip(mean, middle, strict=True)]
+        covs = []
+        for own, (i, j), begin in zip(cov, PAIRS, self._variances, strict=True):
+            square = apart[i] * apart[j]
+            pooled = (weight * (own + square)).sum(axis=0, keepdims=True)
+            joint = same * own + other * pooled + same * other * square
+            covs.append(joint * KEPT**2 + (1.0 - KEPT**2) * begin)
+        return mixed, means, covs
 
-    def _weigh(
-        self,
-        weight: Floats,
-        mean: Floats,
-        cov: Floats,
-        row: tuple[Floats, Floats, Floats, Floats, Floats],
-        missing: Floats,
-    ) -> tuple[Belief, float]:
-        """The belief after the torques of a row (Kalman's update on each ground), and misfit.
+    def updated(
+        self, ops: Any, grounds: tuple[Any, Any, Any], *, reading: Any, seen: Any, load: Any,
+        low: Any, high: Any, share: Any, rise: Any, step: Any, missing: Any, kept: Any, error: Any,
+    ) -> tuple[Any, list[Any], list[Any], Any]:  # fmt: skip
+        """Grounds after the torques of a row (Kalman's update on each), and misfit (1,).
 
-        An error of the pitch changes the torques of all wheels together, by `common` for each of
-        its standard deviations: a covariance of rank one beside that of each wheel.
+        An error of the pitch changes the torques of all wheels together: a covariance of rank one
+        beside that of each wheel.
+
+        ops: Has `exp`, `log`, `maximum` and `where`: numpy, or, for values of a graph, the module
+            `training.onnx_graph.value`. The formula is the same for both.
+        grounds: Weights (n, 1), two means and three covariances (n, k) each, before the row.
+        reading, seen, load: Read torques, 0 where there are none; 1 where there is one, else 0;
+            loads, (k,).
+        low, high: Torques at both ends of the interval of slips, (n, k).
+        share, rise, step: Share of the way between them, and pull and travel between them, (n, 1).
+        missing: Pull that no slip gives, N, (n, 1).
+        kept: Of `rims`.
+        error: Standard deviation of the force along the slope, N.
         """
-        torque, model, spread, common, load = row
-        seen = np.abs(torque) <= self.most_torque
-        reading = np.where(seen, torque, 0.0)
-        noise = self.noise[0] ** 2 + (self.noise[1] * reading) ** 2
-        noise = noise + (MODEL_NOISE * reading) ** 2 + spread
-        gain = np.stack([cov[0] + cov[1] * model, cov[1] + cov[2] * model])
-        variance = gain[0] + gain[1] * model + noise
-        residual = reading - self.errors.loss - model - mean[0] - mean[1] * model
-        common = np.where(seen, common, 0.0)
-        precision = 1.0 + (common**2 / variance).sum(axis=1)
-        shared = (common * residual / variance).sum(axis=1) / precision
-        squares = np.where(seen, residual**2 / variance, 0.0).sum(axis=1) - shared**2 * precision
-        logs = -0.5 * (squares + np.log(precision))
-        logs -= 0.5 * np.where(seen, np.log(variance), 0.0).sum(axis=1)
-        wide = (OUTLIER_STD * load * self.table.radius) ** 2
-        strange = np.where(seen, residual**2 / wide + np.log(wide), 0.0)
-        glitch = np.log(OUTLIER) - 0.5 * strange.sum(axis=1)
-        sound = np.log1p(-OUTLIER) + logs
-        both = np.logaddexp(sound, glitch)
-        used = np.exp(sound - both)[:, None] * seen
-        logs = POWER * both - 0.5 * (missing / (self.errors.pull_std * self.weight)) ** 2
-        logs = logs + np.log(weight)
-        after = np.exp(logs - logs.max())
-        after /= after.sum()
-        variance = variance + common**2 / precision[:, None]
-        step = used * gain / variance
-        mean = mean + step * (residual - common * shared[:, None])
-        cov = cov - np.stack([step[0] * gain[0], step[0] * gain[1], step[1] * gain[1]])
-        misfit = float(after @ squares) / max(int(seen.sum()), 1)
-        return Belief(after, mean, cov), misfit
+        weight, mean, cov = self._mixed(*grounds)
+        risen, floor = high - low, self.table.floor[:, None].astype(float)
+        model = low + share * risen
+        of_floor = squared(load * (FLOOR_NOISE * self.table.radius))
+        spread = squared(risen / step * float(self.errors.speed_std)) * kept
+        spread = spread * (1.0 - floor) + of_floor * floor
+        constant, of_reading = self.noise
+        noise = squared(reading) * float(of_reading**2 + MODEL_NOISE**2) + float(constant**2)
+        gain = [cov[0] + cov[1] * model, cov[1] + cov[2] * model]
+        variance = gain[0] + gain[1] * model + (noise + spread)
+        residual = reading - float(self.errors.loss) - model - mean[0] - mean[1] * model
+        common = risen / rise * error * seen
+        precision = (common * common / variance).sum(axis=1, keepdims=True) + 1.0
+        shared = (common * residual / variance).sum(axis=1, keepdims=True) / precision
+        squares = (squared(residual) / variance * seen).sum(axis=1, keepdims=True)
+        squares = squares - squared(shared) * precision
+        volume = (ops.log(variance) * seen).sum(axis=1, keepdims=True)
+        wide = squared(load * (OUTLIER_STD * self.table.radius))
+        strange = ((squared(residual) / wide + ops.log(wide)) * seen).sum(axis=1, keepdims=True)
+        glitch = strange * -0.5 + float(np.log(OUTLIER))
+        sound = (squares + ops.log(precision) + volume) * -0.5 + float(np.log1p(-OUTLIER))
+        larger = ops.maximum(sound, glitch)
+        both = larger + ops.log(ops.exp(sound - larger) + ops.exp(glitch - larger))
+        used = ops.exp(sound - both) * seen
+        scale = float(1.0 / (self.errors.pull_std * self.weight))
+        logs = both * POWER - squared(missing * scale) * 0.5 + ops.log(weight)
+        after = ops.exp(logs - logs.max(axis=0, keepdims=True))
+        after = after / after.sum(axis=0, keepdims=True)
+        variance, left = variance + common * common / precision, residual - common * shared
+        steps = [used * one / variance for one in gain]
+        means = [one + own * left for one, own in zip(mean, steps, strict=True)]
+        covs = [own - steps[i] * gain[j] for own, (i, j) in zip(cov, PAIRS, strict=True)]
+        misfit = (after * squares).sum(axis=0, keepdims=True).reshape(1)
+        return after, means, covs, misfit / ops.maximum(seen.sum(axis=0, keepdims=True), 1.0)
 
     def _answer(
         self, weight: Floats, speed: Floats, rim_speed: Floats, missing: Floats, misfit: float
@@ -277,9 +298,14 @@ def travel_ratio(slip: Floats) -> Floats:
     return np.where(slip < 0.0, 1.0 / (1.0 + np.minimum(slip, 0.0)), 1.0 - slip)
 
 
-def slip_of_ratio(ratio: Floats) -> Floats:
-    """Slip from v / (r omega)."""
-    return np.where(ratio > 1.0, 1.0 / np.maximum(ratio, 1.0) - 1.0, 1.0 - ratio)
+def slip_of_ratio(ratio: Any, ops: Any = np) -> Any:
+    """Slip from v / (r omega), with operations as in `SlipFilter.updated`."""
+    return ops.where(ratio > 1.0, 1.0 / ops.maximum(ratio, 1.0) - 1.0, 1.0 - ratio)
+
+
+def squared(x: Any) -> Any:
+    """x times itself."""
+    return x * x
 
 
 def _between(nodes: Floats, values: Floats) -> tuple[np.ndarray, Floats]:

@@ -71,7 +71,6 @@ def test_the_exported_intervals_hold_on_data_of_another_seed(small_model, tmp_pa
         ("", "regressor]] is missing"),
         ('[[regressor]]\ntype = "forest"\n', "fixed-size-lssvm, mlp, linear"),
         ('[[regressor]]\ntype = "mlp"\nlayers = [3]\n', "unknown key 'layers'"),
-        ('rule = "best-linear"\n[[regressor]]\ntype = "linear"\n', "rule is no setting any more"),
         ('[[regressor]]\ntype = "mlp"\nhidden = [0]\n', "whole numbers from 1 to 4096"),
         ('[[regressor]]\ntype = "mlp"\nepochs = 0\n', "1 or more"),
         ('[[regressor]]\ntype = "lssvm"\ngamma = -1.0\n', "above zero"),

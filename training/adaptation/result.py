@@ -27,14 +27,9 @@ from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
 from training.adaptation.judgement import JudgedRun, Judgement
 
-#: Status of an adaptation, and its meaning.
-ADAPTATION_STATUSES = {
-    "adapted": "the adapted file predicts the runs that were kept back better than the old one",
-    "not-better": "an adapted file was trained, and the old one predicts those runs no worse",
-    "not-judged": "an adapted file was trained, and the campaign has too few runs to judge it",
-    "not-supported": "the gap analysis does not support a change of the model",
-}
-#: Tone of the verdict, and its status in words, by status.
+#: Tone of the verdict, and its status in words, by status: the adapted file predicts runs that were
+#: kept back better than the old one; it was trained, and the old one predicts them no worse; it was
+#: trained, and the campaign has too few runs to judge it; the gap analysis supports no change.
 TONES = {
     "adapted": ("good", "adapted"),
     "not-better": ("warn", "old file stays"),
@@ -52,7 +47,7 @@ class AdaptReport(Result):
     Attributes
     ----------
     status : str
-        One of `ADAPTATION_STATUSES`; with `not-better` and `not-supported` the old file stays.
+        One of `TONES`; with `not-better` and `not-supported` the old file stays.
     gap_status, gap_sentence : str
         Verdict of the gap analysis of the campaign.
     effects : tuple of str
@@ -169,20 +164,16 @@ class AdaptReport(Result):
             "remarks": [remark.as_json() for remark in self.remarks],
         }
         if self.judgement is not None:
-            content["judgement"] = _judgement_json(self.judgement)
+            channels = {
+                key: {"before": vars(old), "after": vars(new)}
+                for key, (old, new) in self.judgement.figures().items()
+            }
+            content["judgement"] = {
+                "error_ratio": self.judgement.ratio,
+                "error": dict(zip(("before", "after"), self.judgement.error(), strict=True)),
+                "channels": channels,
+            }
         return content
-
-
-def _judgement_json(judgement: Judgement) -> dict[str, Any]:
-    before, after = judgement.error()
-    return {
-        "error_ratio": judgement.ratio,
-        "error": {"before": before, "after": after},
-        "channels": {
-            key: {"before": vars(old), "after": vars(new)}
-            for key, (old, new) in judgement.figures().items()
-        },
-    }
 
 
 def _table(found: AdaptReport) -> ReportTable:

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.quantities import Z_50, Z_90
+from training.dataset import Dataset
 
 
 @dataclass(frozen=True)
@@ -66,3 +68,24 @@ def calibrated(regressor: Any, mean: Floats, std: Floats, truth: Floats) -> Cali
     z = (truth - mean) / std
     std_scale = np.sqrt(np.mean(z**2, axis=0))
     return CalibratedRegressor(regressor, std_scale, np.corrcoef(z.T).reshape(z.shape[1], -1))
+
+
+MOST_ROWS = 2000  # Most rows whose errors a file carries
+
+
+def measure_held_out(mean: Floats, std: Floats, data: Dataset) -> HeldOutErrors:
+    """The errors of a file on rows that it has not seen, one of each run.
+
+    mean, std (n, q): Estimates of the rows of `data`.
+    """
+    first = np.asarray([run[0] for run in data.runs()])
+    if len(first) > MOST_ROWS:
+        first = first[np.linspace(0, len(first) - 1, MOST_ROWS).astype(int)]
+    first = first[np.argsort(data.row[first])]
+    found = {
+        "rows": data.row[first].tolist(),
+        "truth": data.targets[first].tolist(),
+        "mean": mean[first].tolist(),
+        "std": std[first].tolist(),
+    }
+    return HeldOutErrors.of(HeldOutErrors.of(found).entry())  # as it is read back from the file

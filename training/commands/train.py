@@ -77,13 +77,13 @@ def _any_wheel(args: argparse.Namespace) -> int:
     from training.export.model_card import any_wheel_card
     from training.export.model_file import export_any_wheel
     from training.spec import read_any_wheel_spec
-    from training.train import train_any_wheel
+    from training.train import train_sets
 
     if args.data is not None:
         raise InputError(f"{args.data}: {args.spec} simulates its own rows; leave the data out")
     spec, out = read_any_wheel_spec(args.spec), Path(args.out)
     with stage_progress() as progress:
-        posterior, figures = train_any_wheel(spec, progress)
+        posterior, figures = train_sets(spec.family, spec.response, spec.noise, progress)
         with atomic_outputs(outputs(args)) as (model, page):
             metadata = export_any_wheel(spec, posterior, figures, model)
             page.write_text(

@@ -8,7 +8,6 @@ from typing import Any
 
 from soilml.quantities import SHEAR
 from training.calibration.recalibration import Metrics
-from training.regressors.gaussian_regressor import FeatureSubset
 from training.set_posterior.error_scales import ErrorScales
 from training.set_posterior.validation import SetFigures, table_of
 from training.train import TrainedModel
@@ -40,8 +39,8 @@ ONE_RUN = (
 HELD_OUT = (
     "The file has its errors on {rows} rows left out: fused with another file that was trained "
     "from the same data, it is weighed by the correlation of their errors, and the interval is "
-    "calibrated for the pair. Repeated readings of one soil at one slip and load share so much of "
-    "the variance of their error, which does not average out: {shares}."
+    "calibrated for the pair. Repeated readings of one soil at one slip and load share most "
+    "of their error, which does not average out."
 )
 SET_POSTERIOR = (
     "Several readings of one soil by the set posterior (`run`, `step`): the exact likelihood of "
@@ -86,10 +85,8 @@ def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) ->
         if (carried := trained.set_posterior.response.carried) < 1.0:
             lines += [CARRIED.format(carried), ""]
         lines += [*trained.set_posterior.scales.for_card(), ""]
-    elif trained.errors is not None and trained.common_share is not None:
-        parts = zip(targets, trained.common_share, strict=True)
-        shares = ", ".join(f"{target} {share:.0%}" for target, share in parts)
-        lines += [HELD_OUT.format(rows=len(trained.errors.rows), shares=shares), ""]
+    elif trained.errors is not None:
+        lines += [HELD_OUT.format(rows=len(trained.errors.rows)), ""]
     lines += ["## Made by", "", *_provenance(trained, metadata), ""]
     return "\n".join(lines)
 
@@ -107,7 +104,11 @@ def _summary(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]:
     """What is estimated from what, and by which regressors."""
     outputs = _enumerate(o["name"].replace("_", " ") for o in json.loads(metadata["outputs"]))
     inputs = _enumerate(i["name"] for i in json.loads(metadata["inputs"]))
-    regressors = ", ".join(_describe(member.regressor) for member in trained.members)
+    used = [member.regressor for member in trained.members]
+    settings = [one.model.fitted_settings() for one in used]
+    regressors = ", ".join(
+        f"{one.name} ({own})" if own else one.name for one, own in zip(used, settings, strict=True)
+    )
     text = f"Estimates {outputs} from one reading of {inputs}. Regressors: {regressors}."
     if len(trained.members) > 1:
         text += " They are fused by the covariance of their errors."
@@ -156,11 +157,6 @@ def _provenance(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]
         f"spread; opset {metadata['opset']}, IR {metadata['ir_version']}",
         f"- soilml {metadata['soilml_version']}",
     ]
-
-
-def _describe(regressor: FeatureSubset) -> str:
-    settings = regressor.model.fitted_settings()
-    return f"{regressor.name} ({settings})" if settings else regressor.name
 
 
 def _enumerate(words: Iterable[str]) -> str:

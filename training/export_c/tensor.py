@@ -33,11 +33,9 @@ def kind_of(element_type: int, name: str) -> str:
 
 def kind_of_array(values: NDArray[Any], name: str) -> str:
     """The C type of the elements of an array."""
-    kinds = {"float32": "float", "float64": "double", "int32": "int", "int64": "int"}
-    kind = (kinds | {"bool": "bool"}).get(values.dtype.name)
-    if kind is None:
-        raise ModelFileError(f"constant {name} has elements of type {values.dtype.name}")
-    return kind
+    from onnx import helper
+
+    return kind_of(helper.np_dtype_to_tensor_dtype(values.dtype), name)
 
 
 def broadcast(shapes: Iterable[Shape]) -> Shape:

@@ -241,18 +241,14 @@ class Graph:
         own = [(DOMAIN, 1)] if self.functions else []
         return [("", OPSET), *own, *sorted(self._domains.items())]
 
-    def model(
-        self, inputs: Sequence[str] | Mapping[str, list[Any]], outputs: Mapping[str, Output]
-    ) -> Any:
+    def model(self, inputs: Mapping[str, list[Any]], outputs: Mapping[str, Output]) -> Any:
         """The finished and checked ONNX model.
 
-        inputs: Names of float32 inputs of shape [rows], or name -> shape. `SET_SWITCH` is boolean.
+        inputs: Name -> shape; they are float32, but `SET_SWITCH`, which is boolean.
         outputs: Name -> element type and shape.
         """
         from onnx import checker, helper
 
-        if not isinstance(inputs, Mapping):
-            inputs = {name: ["rows"] for name in inputs}
         nodes, constants = self.needed([*outputs, *inputs])
         graph = helper.make_graph(
             nodes,

@@ -161,6 +161,14 @@ class Value:
         """The sum of squares over one axis or all; see `reduce`."""
         return self.reduce("ReduceSumSquare", axis, keepdims)
 
+    def mean(self, axis: int | None = None, keepdims: bool | None = None) -> Value:
+        """The mean over one axis or all; see `reduce`."""
+        return self.reduce("ReduceMean", axis, keepdims)
+
+    def max(self, axis: int | None = None, keepdims: bool | None = None) -> Value:
+        """The largest along one axis or all; see `reduce`."""
+        return self.reduce("ReduceMax", axis, keepdims)
+
     def min(self, axis: int) -> Value:
         """The least along one axis, which is left out."""
         return self.reduce("ReduceMin", axis, False)

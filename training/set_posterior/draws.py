@@ -61,11 +61,6 @@ class ProposalDraws(NamedTuple):
     log_density: Value
 
 
-def sample_sizes(unknowns: int) -> SampleSizes:
-    """Sizes of the rounds by the number of unknowns."""
-    return SIZES_FEW if unknowns <= FEW_UNKNOWNS else SIZES_MANY
-
-
 def prior_draws(
     graph: Graph, axes: Sequence[PriorAxis], order: tuple[int, ...], count: int
 ) -> ProposalDraws:

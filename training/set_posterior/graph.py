@@ -25,10 +25,12 @@ from soilml.onboard.set_contract import (
 from training.onnx_graph.builder import BOOL, FLOAT, Graph, Output
 from training.onnx_graph.value import Value
 from training.set_posterior.draws import (
+    FEW_UNKNOWNS,
+    SIZES_FEW,
+    SIZES_MANY,
     SIZES_SMALL,
     adapted_draws,
     prior_draws,
-    sample_sizes,
 )
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 from training.set_posterior.families.wheel_family import WheelFamily
@@ -125,7 +127,8 @@ class SetPosteriorGraph:
         usual = family.model_errors()
         polynomials = Polynomials.of(axes, terms if nearly is None else nearly.sampled)
         consistency = self.limits.of_set(counts)
-        sizes = SIZES_SMALL if self.small else sample_sizes(len(axes))
+        sizes = SIZES_FEW if len(axes) <= FEW_UNKNOWNS else SIZES_MANY
+        sizes = SIZES_SMALL if self.small else sizes
         likelihood = Likelihood(
             polynomials, rows, state, inputs[MODEL_ERROR_INPUT], self.scales,
             tuple(usual[name] > 0.0 for name in MODEL_ERROR_COLUMNS), nearly, sizes, family.targets,

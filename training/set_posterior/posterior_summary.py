@@ -187,7 +187,10 @@ def add_posterior_outputs(
     if scale is not None:
         chosen = chosen * (scale * scale.reshape(-1, 1))
     chosen.named(f"{prefix}{SET_PREFIX}covariance")
-    _add_edge_flag(family, mean, std).named(f"{prefix}{SET_PREFIX}at_edge")
+    ends = np.asarray([axis.ends for axis in family.axes[: family.targets]])
+    middle, half = ends.mean(axis=1), 0.5 * np.diff(ends, axis=1)[:, 0]
+    near = absolute(mean - middle) + std * EDGE_STDS > half
+    near.named(f"{prefix}{SET_PREFIX}at_edge")
     vague = std > NOT_IDENTIFIED_ABOVE * prior["std"]
     (vague | ~consistent).named(f"{prefix}{SET_PREFIX}abstains")
     misfit.node("Identity").named(f"{prefix}{SET_PREFIX}misfit")
@@ -207,14 +210,6 @@ def variance_of_few_points(weights: Value) -> Value:
     """
     share = minimum(weights.sum_of_squares(axis=1, keepdims=False), LARGEST_SHARE)
     return (share + 1.0) / (1.0 - share)
-
-
-def _add_edge_flag(family: WheelFamily, mean: Value, std: Value) -> Value:
-    """Whether a mean is within `EDGE_STDS` standard deviations of an end of its prior, (q,)."""
-    ends = np.asarray([axis.ends for axis in family.axes[: family.targets]])
-    middle, half = ends.mean(axis=1), 0.5 * np.diff(ends, axis=1)[:, 0]
-    near: Value = absolute(mean - middle) + std * EDGE_STDS > half
-    return near
 
 
 def prior_summary(family: WheelFamily) -> dict[str, Floats]:

@@ -23,7 +23,7 @@ from soilml.onboard.set_contract import (
 )
 from soilml.processes import process_map
 from training.onnx_graph.builder import Graph, session_of
-from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
+from training.set_posterior.families.wheel_family import SimulatedSets
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.posterior_summary import INTERVAL, MisfitLimits, prior_summary
 from training.set_posterior.response_surface import Response
@@ -124,7 +124,10 @@ def _figures(posterior: SetPosteriorGraph, rows: int) -> SetFigures:
     error = sets.truth - mean
     precision = np.linalg.pinv(cov, hermitian=True)
     mahalanobis = np.einsum("ni,nij,nj->n", error, precision, error)  # squared
-    prior_std = _prior_std(posterior.family, sets)
+    scale = np.ones_like(sets.truth)
+    for k, axis in enumerate(posterior.family.axes[: posterior.family.targets]):
+        scale[:, k] = sets.context.get(f"{axis.name}_max", scale[:, k])
+    prior_std = prior_summary(posterior.family)["std"] * scale
     return SetFigures(
         sets=len(error),
         relative=np.sqrt(np.mean((error / prior_std) ** 2, axis=0)),
@@ -132,14 +135,6 @@ def _figures(posterior: SetPosteriorGraph, rows: int) -> SetFigures:
         joint90=float(np.mean(mahalanobis <= chi2.ppf(0.9, error.shape[1]))),
         refused=1.0 - float(np.mean([a["set_in_range"][0] for a in outputs])),
     )
-
-
-def _prior_std(family: WheelFamily, sets: SimulatedSets) -> Floats:
-    """Standard deviation of the prior of each set, (sets, q)."""
-    scale = np.ones_like(sets.truth)
-    for k, axis in enumerate(family.axes[: family.targets]):
-        scale[:, k] = sets.context.get(f"{axis.name}_max", scale[:, k])
-    return np.asarray(prior_summary(family)["std"] * scale)
 
 
 def posterior_session(posterior: SetPosteriorGraph, outputs: Sequence[str] = ()) -> Any:

@@ -67,7 +67,11 @@ def slip_files(
         "soilml_format": SLIP_FORMAT,
         "soilml_version": __version__,
         "rover": json.dumps(_rover_entry(rover, table)),
-        "prior": json.dumps(_prior_entry(table)),
+        # ends of the 90 % interval, with the median between, of each parameter, SI
+        "prior": json.dumps(dict(zip(
+            table.names, np.quantile(table.values, (0.05, 0.5, 0.95), axis=0).T.tolist(),
+            strict=True,
+        ))),
         "table": json.dumps({
             "load_N": [float(table.load[0]), float(table.load[-1])],
             "load_of_attitude": shares.tolist(),
@@ -100,12 +104,6 @@ def _rover_entry(rover: WheeledRover, table: ForceTable) -> dict[str, Any]:
             for (name, wheel), radius in zip(rover.wheels.items(), table.radius, strict=True)
         ],
     }
-
-
-def _prior_entry(table: ForceTable) -> dict[str, list[float]]:
-    """Ends of the 90 % interval, with the median between, of each parameter of the soils, SI."""
-    ends = np.quantile(table.values, (0.05, 0.5, 0.95), axis=0)
-    return dict(zip(table.names, ends.T.tolist(), strict=True))
 
 
 def _probe(filter_: SlipFilter, rover: WheeledRover, least_speed: float) -> list[dict[str, Any]]:

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.slip_filter.filter import travel_ratio
+from soilml.slip_filter.filter import slip_of_ratio, travel_ratio
 from soilml.slip_filter.force_table import ForceTable
+from training.onnx_graph import value
 from training.onnx_graph.builder import Graph
-from training.onnx_graph.value import Value, absolute, concat, constant, log, where
+from training.onnx_graph.value import Value, absolute, concat, constant, log
 
 RATIO_ENDS = (0.01, 10.0)  # Of rim speeds to each other
 
@@ -25,7 +26,7 @@ class ForceCurves:
     def __init__(self, graph: Graph, table: ForceTable, rim: Value, load: Value) -> None:
         self.graph, self.table, self.load = graph, table, load
         levels = len(table.load)
-        fastest = rim.reduce("ReduceMax", 0, True)
+        fastest = rim.max(0, True)
         level = (log(load) - float(np.log(table.load[0]))) * float(
             (levels - 1) / np.log(table.load[-1] / table.load[0])
         )
@@ -34,7 +35,7 @@ class ForceCurves:
         for i in range(len(table.wheels)):
             travel = constant(graph, travel_ratio(table.slip)[None])
             ratio = fastest / rim.take([i], 0) * travel  # (1, m)
-            slip = slip_of(ratio.clip(*RATIO_ENDS)).clip(
+            slip = slip_of_ratio(ratio.clip(*RATIO_ENDS), value).clip(
                 float(table.slip[0]), float(table.slip[-1])
             )
             at = absolute(level.take([i], 0) - constant(graph, np.arange(levels)[None]))
@@ -73,11 +74,6 @@ def at_ends(values: Value, hot: Value, m: int) -> tuple[Value, Value]:
     """Values (n, m) at both ends of the interval that `hot` (n, m - 1) marks, (n, 1) each."""
     low, high = values.columns(0, m - 1), values.columns(1, m)
     return (low * hot).sum(1, True), (high * hot).sum(1, True)
-
-
-def slip_of(ratio: Value) -> Value:
-    """Slip from v / (r omega), above zero."""
-    return where(ratio > 1.0, 1.0 / ratio.clip(1.0) - 1.0, 1.0 - ratio)
 
 
 def _hats(graph: Graph, nodes: Floats, places: Value) -> Value:

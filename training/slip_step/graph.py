@@ -15,25 +15,15 @@ from soilml.arrays import Floats
 from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.onboard.slip_stream import FLAGS, JUDGED, QUANTILES, RECENT
 from soilml.slip_filter.drive import LIKELY, QUANTILE, WIDE
-from soilml.slip_filter.filter import (
-    CHANGE,
-    FLOOR_NOISE,
-    KEPT,
-    MODEL_NOISE,
-    OUTLIER,
-    OUTLIER_STD,
-    POWER,
-    ROWS_ALIKE,
-    SlipFilter,
-    travel_ratio,
-)
+from soilml.slip_filter.filter import TINY, SlipFilter, slip_of_ratio, squared
+from training.onnx_graph import value
 from training.onnx_graph.builder import FLOAT, Graph
-from training.onnx_graph.value import Value, absolute, concat, constant, exp, log, sqrt, where
-from training.slip_step.force_curves import RATIO_ENDS, ForceCurves, at_ends, slip_of
+from training.onnx_graph.value import Value, absolute, concat, constant, sqrt, where
+from training.slip_step.force_curves import RATIO_ENDS, ForceCurves, at_ends
 
 #: Places of the distribution function of the speed, in standard deviations about the mean.
 PLACES = np.arange(-4.0, 4.01, 0.125)
-TINY, FAR = 1e-12, 1e30  # Smallest divisor; numbers beyond are not measured
+FAR = 1e30  # Numbers beyond are not measured
 
 
 def slip_step_model(filter_: SlipFilter, least_speed: float, gravity: float) -> Any:
@@ -85,7 +75,7 @@ class _Step:
 
     def __init__(self, graph: Graph, filter_: SlipFilter) -> None:
         self.graph, self.filter, self.table = graph, filter_, filter_.table
-        self.errors, self.ratio = filter_.errors, travel_ratio(filter_.table.slip)
+        self.errors, self.ratio = filter_.errors, filter_.ratio
         self.k = len(filter_.table.wheels)
 
     def add(self, read: dict[str, Value], least_speed: float, gravity: float) -> None:
@@ -95,38 +85,41 @@ class _Step:
         way = where(read["rim_speed"].take([0], 0) < 0.0, constant(self.graph, [-1.0]), 1.0)
         raw = read["rim_speed"] * way
         usable = as_float(raw.reduce("ReduceMin", 0, True) > least_speed)
-        middle, before = raw.reduce("ReduceMean", 0, True), recent.take([1], 0)
+        middle, before = raw.mean(0, True), recent.take([1], 0)
         change = absolute(middle - before) / (read["elapsed"].clip(TINY) * gravity)
         steady = where(before > 0.0, change, 0.0) <= float(self.errors.pull_std)
         sound = usable * as_float(steady)
-        standing = as_float(absolute(raw).reduce("ReduceMax", 0, True) <= least_speed)
+        standing = as_float(absolute(raw).max(0, True) <= least_speed)
         raw = where(usable > 0.5, raw, float(least_speed) + constant(self.graph, np.ones(self.k)))
         torque = read["torque"] * way
         size, most = absolute(torque), constant(self.graph, self.filter.most_torque)
         seen = size <= most
-        wild = (as_float(size > most) * as_float(size < FAR)).reduce("ReduceMax", 0, True)
+        wild = (as_float(size > most) * as_float(size < FAR)).max(0, True)
         load = read["load"].clip(float(self.table.load[0]), float(self.table.load[-1]))
-        rim, apart, kept = self._rims(recent.take([0], 0), raw)
+        rim, apart, kept = self.filter.rims(value, recent.take([0], 0), raw)
         curves = ForceCurves(self.graph, self.table, rim, load)
         slope = read["slope"] * way
-        share = constant(self.graph, self.filter._share[:, None])
+        share = constant(self.graph, self.filter.share[:, None])
         needed = (slope.node("Sin") + share) * self.filter.weight
         hot, part, missing, rise, place = self._balance(curves.pull(), needed)
         error = slope.node("Cos") * float(self.filter.weight * self.errors.slope_std)
         ends = [curves.torques(wheel, hot) for wheel in range(self.k)]
         low, high = (concat(own, 1) for own in zip(*ends, strict=True))
-        risen = high - low
-        step = (hot * constant(self.graph, np.diff(-self.ratio)[None])).sum(1, True)
-        floor = constant(self.graph, self.table.floor[:, None].astype(float))
-        of_speed = squared(risen / step * float(self.errors.speed_std)) * kept
-        of_floor = squared(load * constant(self.graph, FLOOR_NOISE * self.table.radius))
-        likely = self._weigh(
-            read["grounds"], where(seen, torque, 0.0), as_float(seen), low + part * risen,
-            of_speed * (1.0 - floor) + of_floor * floor, risen / rise * error, load, missing,
+        weight, *parts = read["grounds"].split([1, *[self.k] * 5], 1)
+        after, means, covs, misfit = self.filter.updated(
+            value, (weight, parts[:2], parts[2:]), reading=where(seen, torque, 0.0),
+            seen=as_float(seen), load=load, low=low, high=high, share=part, rise=rise,
+            step=(hot * constant(self.graph, np.diff(-self.ratio)[None])).sum(1, True),
+            missing=missing, kept=kept, error=error,
         )  # fmt: skip
-        after, misfit, grounds = likely
-        row = constant(self.graph, self.filter._row[:, None])
-        speed = self._ratio_at(place + error * row / rise) * rim.reduce("ReduceMax", 0, True)
+        grounds = concat([after, *means, *covs], 1)
+        row = constant(self.graph, self.filter.of_row[:, None])
+        m = len(self.table.slip)
+        moved = (place + error * row / rise).clip(0.0, float(m - 1))
+        near = (1.0 - absolute(moved - constant(self.graph, np.arange(m)[None]))).clip(0.0)
+        ratio = (near * constant(self.graph, self.ratio[None])).sum(1, True)  # at that place
+        speed = ratio * rim.max(0, True)
+        floor = constant(self.graph, self.table.floor[:, None].astype(float))
         no_soil = (after * floor).sum(0, True).reshape(1)
         beyond = (after * as_float(missing > 0.0)).sum(0, True).reshape(1)
         # a row that is passed over changes nothing
@@ -152,15 +145,6 @@ class _Step:
         flags += [doubt * answered for doubt in doubts]
         concat([*flags, wild * sound], 0).reshape(len(FLAGS)).named("flags")
 
-    def _rims(self, apart: Value, rim: Value) -> tuple[Value, Value, Value]:
-        """As `SlipFilter._rims`."""
-        middle = rim.reduce("ReduceMean", 0, True)
-        away = rim - middle
-        now = squared(away / middle).sum(0, True) * (1.0 / max(self.k - 1, 1))
-        joined = where(apart > 0.0, apart * ROWS_ALIKE + now * (1.0 - ROWS_ALIKE), now)
-        kept = (1.0 - float(self.errors.speed_std**2) / joined.clip(TINY)).clip(0.0)
-        return middle + kept * away, joined, kept
-
     def _balance(self, pull: Value, needed: Value) -> tuple[Value, Value, Value, Value, Value]:
         """Which interval holds the least slip that pulls enough (n, m - 1), the share of the way in
         it, pull that is missing, rise, and the place (n, 1)."""
@@ -168,7 +152,7 @@ class _Step:
         enough = (pull >= needed).astype(np.float32)
         before = enough @ constant(self.graph, np.triu(np.ones((m, m)), 1))
         first = enough * (before < 0.5).astype(np.float32)
-        known = enough.reduce("ReduceMax", 1, True)
+        known = enough.max(1, True)
         begin, second, rest = first.split([1, 1, m - 2], 1)
         hot = concat([second + begin, rest], 1)
         last = np.eye(1, m - 1, m - 2)
@@ -176,71 +160,9 @@ class _Step:
         low, high = at_ends(pull, hot, m)
         rise = (high - low).clip(1e-3 * float(self.filter.weight))
         share = where(known > 0.5, ((needed - low) / rise).clip(0.0, 1.0), 1.0)
-        missing = where(known > 0.5, 0.0 * rise, needed - pull.reduce("ReduceMax", 1, True))
+        missing = where(known > 0.5, 0.0 * rise, needed - pull.max(1, True))
         place = (hot * constant(self.graph, np.arange(m - 1)[None])).sum(1, True) + share
         return hot, share, missing, rise, place
-
-    def _mixed(self, grounds: Value) -> tuple[Value, list[Value], list[Value]]:
-        """As `SlipFilter._mixed`: weight (n, 1), two means and three covariances (n, k) each."""
-        old, *rest = grounds.split([1, *[self.k] * 5], 1)
-        kept = old * (1.0 - CHANGE)
-        weight = kept + constant(self.graph, CHANGE * self.filter._prior[:, None])
-        same = kept / weight
-        means, covs, other = rest[:2], rest[2:], 1.0 - same
-        middle = [(old * mean).sum(0, True) for mean in means]
-        apart = [mean - one for mean, one in zip(means, middle, strict=True)]
-        squares = [apart[0] * apart[0], apart[0] * apart[1], apart[1] * apart[1]]
-        first = [self.errors.loss_std**2, 0.0, self.errors.gain_std**2]
-        new_means = [
-            (same * mean + other * one) * KEPT for mean, one in zip(means, middle, strict=True)
-        ]
-        new_covs = []
-        for cov, square, begin in zip(covs, squares, first, strict=True):
-            pooled = (old * (cov + square)).sum(0, True)
-            mixed = same * cov + other * pooled + same * other * square
-            new_covs.append(mixed * KEPT**2 + float((1.0 - KEPT**2) * begin))
-        return weight, new_means, new_covs
-
-    def _weigh(
-        self, grounds: Value, torque: Value, there: Value, model: Value, spread: Value,
-        common: Value, load: Value, missing: Value,
-    ) -> tuple[Value, Value, Value]:  # fmt: skip
-        """As `SlipFilter._weigh`: weights (n, 1), misfit (1,), and the grounds after the row."""
-        weight, mean, cov = self._mixed(grounds)
-        constant_noise, share = self.filter.noise
-        noise = squared(torque) * float(share**2 + MODEL_NOISE**2) + float(constant_noise**2)
-        gains = [cov[0] + cov[1] * model, cov[1] + cov[2] * model]
-        variance = gains[0] + gains[1] * model + (noise + spread)
-        residual = torque - float(self.errors.loss) - model - mean[0] - mean[1] * model
-        own = common * there
-        precision = (own * own / variance).sum(1, True) + 1.0
-        shared = (own * residual / variance).sum(1, True) / precision
-        squares = (squared(residual) / variance * there).sum(1, True) - squared(shared) * precision
-        volume = (log(variance) * there).sum(1, True)
-        wide = squared(load * constant(self.graph, OUTLIER_STD * self.table.radius))
-        strange = ((squared(residual) / wide + log(wide)) * there).sum(1, True)
-        sound = (squares + log(precision) + volume) * -0.5 + float(np.log1p(-OUTLIER))
-        glitch = strange * -0.5 + float(np.log(OUTLIER))
-        larger = sound.node("Max", glitch)
-        both = larger + log(exp(sound - larger) + exp(glitch - larger))
-        used = exp(sound - both) * there
-        scale = float(1.0 / (self.errors.pull_std * self.filter.weight))
-        logs = both * POWER - squared(missing * scale) * 0.5 + log(weight)
-        after = exp(logs - logs.reduce("ReduceMax", 0, True))
-        after = after / after.sum(0, True)
-        variance, left = variance + own * own / precision, residual - own * shared
-        steps = [used * gain / variance for gain in gains]
-        means = [one + step * left for one, step in zip(mean, steps, strict=True)]
-        pairs = zip(cov, ((0, 0), (0, 1), (1, 1)), strict=True)
-        covs = [one - steps[a] * gains[b] for one, (a, b) in pairs]
-        misfit = (after * squares).sum(0, True).reshape(1) / there.sum(0, True).clip(1.0)
-        return after, misfit, concat([after, *means, *covs], 1)
-
-    def _ratio_at(self, place: Value) -> Value:
-        """Travel over rolling (n, 1) at places of the table."""
-        m = len(self.table.slip)
-        away = absolute(place.clip(0.0, float(m - 1)) - constant(self.graph, np.arange(m)[None]))
-        return ((1.0 - away).clip(0.0) * constant(self.graph, self.ratio[None])).sum(1, True)
 
     def _speeds(self, weight: Value, speed: Value) -> tuple[list[Value], list[Value]]:
         """Mean and standard deviation (1,) of the speed, and its quantiles, rising."""
@@ -271,22 +193,18 @@ class _Step:
             for one, other in ((low, high), (median, median), (high, low))
         ]
         concat([mean * way, spread, *ends], 0).reshape(2 + len(QUANTILES)).named("speed")
-        slips = [slip_of((v / rim).clip(*RATIO_ENDS)) for v in (high, median, low)]
+        slips = [slip_of_ratio((v / rim).clip(*RATIO_ENDS), value) for v in (high, median, low)]
         slip = concat([one.reshape(1, self.k) for one in slips], 0)
         slip.reshape(len(QUANTILES), self.k).named("slip")
-        return (slips[2] - slips[0]).reduce("ReduceMax", 0, True).reshape(1)
+        widest: Value = (slips[2] - slips[0]).max(0, True)
+        return widest.reshape(1)
 
     def _misfits(self, judged: Value) -> Value:
         """Whether the last rows have more misfit than sound ones, 0 or 1, (1,)."""
         degrees = float(JUDGED * self.k)
         limit = chi_squared_quantile(degrees, QUANTILE) / degrees
         full = as_float(judged.reduce("ReduceMin", 0, True) >= 0.0)
-        return as_float(judged.reduce("ReduceMean", 0, True) > float(limit)) * full
-
-
-def squared(x: Value) -> Value:
-    """x times itself."""
-    return x * x
+        return as_float(judged.mean(0, True) > float(limit)) * full
 
 
 def as_float(condition: Value) -> Value:

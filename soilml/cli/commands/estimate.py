@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -116,13 +117,14 @@ def run(args: argparse.Namespace) -> int:
         hinted = recipe_case(estimators[0].metadata["recipe"], estimators[0].path)
     print_table_hints(table, hinted, presentation.trained_radius(estimators[0]))
     pooled, first = args.by is not None, estimators[0]
-    box = narrower_priors(first, case) if case is not None and pooled else {}
     found = estimates_of_table(
-        estimators, table, args.by, box=box, progress=progress_bar,
+        estimators, table, args.by, progress=progress_bar,
         adjusted=lambda one, readings: readings_with_model_error(
             one, readings, case, together=pooled
         ),
     )  # fmt: skip
+    if case is not None and pooled and (box := narrower_priors(first, case)):
+        found = replace(found, estimate=found.estimate.within(**box))
     columns = found.columns(list(dict.fromkeys(n for one in estimators for n in one.inputs)))
     remarks += presentation.remarks_on(found, estimators)
     if args.report is not None:

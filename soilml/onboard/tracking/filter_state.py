@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from soilml.onboard.set_contract import ABSENT_STD, OPERATING_NOISE, OPTIONAL_READINGS
-from soilml.onboard.tracking.misfit import ROWS_JUDGED, Rows
+from soilml.onboard.tracking.misfit import Rows
 from soilml.onboard.tracking.row_window import LEAST_ROWS, RowWindow
 
 MOST_ROWS = 8  # Rows after which one that disagreed is a glitch
@@ -155,18 +155,3 @@ class FilterState:
     rows_since_change: int = 0
     rows_since_drift: int = -1
     variance: float = 1.0
-
-    def with_increase(self, value: float) -> FilterState:
-        """The state after a row that added so much to the misfit, over its median."""
-        return replace(self, increases=(*self.increases, value)[-ROWS_JUDGED:])
-
-    def of_another_soil(self, window: RowWindow) -> FilterState:
-        """The state with rows of another soil alone; the size of the model error is kept."""
-        kept = len(self.increases) - len(self.question.rows)
-        return FilterState(
-            window,
-            repeated=self.repeated,
-            increases=self.increases[: max(kept, 0)],
-            rows_since_change=window.memory.rows,
-            variance=self.variance,
-        )

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.exact_check import NO_ROWS
@@ -70,16 +69,6 @@ def fit_memory(estimator: Estimator, memory: Memory) -> JointFit:
     return fit_rows(estimator, estimator.sets.rows(NO_ROWS) if estimator.sets else {}, memory)
 
 
-def with_noise(memory: Memory, variance: float) -> Memory:
-    """The memory of the same rows with noise of so many times the stated variance."""
-    return replace(memory, system=memory.system / np.sqrt(variance))
-
-
-def chi_squared_limit(degrees: float, quantile: float = QUANTILE) -> float:
-    """The value that a chi-squared variable exceeds as rarely as a normal one its quantile."""
-    return chi_squared_quantile(degrees, quantile)
-
-
 def excess_noise(misfit: float, readings: float, unknowns: int) -> float:
     """Variance of the residuals of a fit over that of the stated noise.
 
@@ -98,8 +87,3 @@ def usual_excess(increases: Sequence[float]) -> float:
     """
     assumed = [1.0] * ASSUMED_ROWS
     return float(np.clip(np.median([*assumed, *increases]), 1.0, MOST_EXCESS))
-
-
-def over_median(misfit: float, readings: float) -> float:
-    """What a row adds to the misfit over the median of chi-squared with its readings."""
-    return misfit / chi_squared_quantile(readings, 0.0)

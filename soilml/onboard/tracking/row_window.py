@@ -51,20 +51,10 @@ class RowWindow:
     added: tuple[float, ...] = ()
     recent: tuple[RecentRows, ...] = ()
 
-    @staticmethod
-    def empty(start: Memory, length: int) -> RowWindow:
-        """A window that remembers between `length` rows and a block more."""
-        return RowWindow((), start, length)
-
     @property
     def rows_per_block(self) -> int:
         """Rows after which another block begins, but for the last rows."""
         return -(-self.length // BLOCKS)
-
-    @property
-    def is_full(self) -> bool:
-        """Whether the oldest block is to be forgotten."""
-        return self.memory.rows > self.length + self.rows_per_block
 
     def with_rows(self, rows: Rows, after: Memory, added: float = 0.0) -> RowWindow:
         """The window with one more row, or its first ones, from its memory after them, not packed.
@@ -95,14 +85,6 @@ class RowWindow:
             return None
         return len(self.blocks) - len(known) + known.index(min(known))
 
-    def rows_of(self, block: int) -> Rows:
-        """The rows of a recent block as they were read."""
-        return self.recent[block - len(self.blocks)].rows
-
-    def without(self, block: int) -> Memory:
-        """The memory of all rows but those of one block, which is not the only one."""
-        return join((*self.blocks[:block], *self.blocks[block + 1 :]))
-
     def read_again(self, block: int, after: Memory) -> RowWindow:
         """The window with a recent block as it is in the memory `after`, behind all others.
 
@@ -120,14 +102,6 @@ class RowWindow:
         blocks = self.blocks[block:]
         added, recent = self.added[-len(blocks) :], self.recent[-len(blocks) :]
         return replace(self, blocks=blocks, memory=join(blocks), added=added, recent=recent)
-
-    def before(self, block: int) -> Memory:
-        """The memory of the rows before this block."""
-        return join(self.blocks[:block])
-
-    def with_another_soil(self) -> RowWindow:
-        """The window whose rows are all of one soil: what they added to the misfit is forgotten."""
-        return replace(self, added=(0.0,) * len(self.added))
 
     def suspect(self, excess: float) -> int:
         """The block with which another soil begins most likely: the last ones added most.

@@ -10,6 +10,7 @@ from typing import Any, final
 import numpy as np
 
 from soilml.errors import InputError
+from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.exact_check import with_exact_check
@@ -21,18 +22,17 @@ from soilml.onboard.tracking.misfit import (
     CHANGE_QUANTILE,
     ERROR_DEGREES,
     MOST_VARIANCE,
+    QUANTILE,
+    ROWS_JUDGED,
     JointFit,
     Rows,
-    chi_squared_limit,
     excess_noise,
     fit_memory,
     fit_rows,
     judging,
-    over_median,
     usual_excess,
-    with_noise,
 )
-from soilml.onboard.tracking.row_window import RowWindow
+from soilml.onboard.tracking.row_window import RowWindow, join
 from soilml.onboard.tracking.state_file import packed_state, unpacked_state
 
 #: After so many rows the last half of the rows is compared with the first, for a slow drift.
@@ -146,7 +146,7 @@ class SoilTracker:
         self._judge = judging(estimator)
         self._estimated = None
         self._empty = estimator.start()
-        self._begin(FilterState(RowWindow.empty(self._empty, self.length)))
+        self._begin(FilterState(RowWindow((), self._empty, self.length)))
 
     def read(self, **measured: float) -> TrackerState:
         """The state after one more row.
@@ -176,7 +176,7 @@ class SoilTracker:
 
     def restart(self) -> TrackerState:
         """Forget all rows, because the soil is known to be another one."""
-        self._begin(FilterState(RowWindow.empty(self._empty, self.length)))
+        self._begin(FilterState(RowWindow((), self._empty, self.length)))
         return self.state
 
     def save(self) -> bytes:
@@ -237,8 +237,10 @@ class SoilTracker:
             words = "slip, load or noise are out of the range of the file: not used"
             return self._answer(Event.UNUSABLE, words)
         misfit = fit.misfit - before.misfit
-        limit = self._excess(before.misfit, before.readings) * chi_squared_limit(readings)
-        state = self._filter.with_increase(over_median(misfit, readings))
+        limit = chi_squared_quantile(readings, QUANTILE)
+        limit *= self._excess(before.misfit, before.readings)
+        increases = (*self._filter.increases, misfit / chi_squared_quantile(readings, 0.0))
+        state = replace(self._filter, increases=increases[-ROWS_JUDGED:])
         if misfit > limit and window.blocks:
             question = state.question.with_row(row, True)
             self._filter = replace(state, question=question)
@@ -262,7 +264,9 @@ class SoilTracker:
         block = window.least_known
         if block is None or len(window.blocks) < 2:
             return
-        fit = fit_rows(self._judge, window.rows_of(block), window.without(block))
+        others = join((*window.blocks[:block], *window.blocks[block + 1 :]))
+        as_read = window.recent[block - len(window.blocks)].rows
+        fit = fit_rows(self._judge, as_read, others)
         if fit.readings == self._fit.readings:  # rounding may take a reading to the other side
             self._filter = replace(self._filter, window=window.read_again(block, fit.memory))
             self._fit = fit
@@ -274,7 +278,7 @@ class SoilTracker:
             fit = fit_rows(self._judge, rows, self._empty)
             degrees = max(fit.readings - len(self.estimator.names), 1.0)
             excess = self._excess(self._fit.misfit, self._fit.readings)
-            agree = fit.misfit <= excess * chi_squared_limit(degrees)
+            agree = fit.misfit <= excess * chi_squared_quantile(degrees, QUANTILE)
             if agree or question.in_succession >= GIVE_UP_AFTER:
                 return self._begin_with(rows, fit, agree)
         return self._answer(
@@ -284,8 +288,16 @@ class SoilTracker:
     def _begin_with(self, rows: Rows, fit: JointFit, agree: bool) -> TrackerState:
         """Forget all but some rows in question."""
         count, earlier = len(rows["slip"]), self._filter.window.memory.rows
-        window = RowWindow.empty(self._empty, self.length).with_rows(rows, fit.memory)
-        self._filter = self._filter.of_another_soil(window)
+        window = RowWindow((), self._empty, self.length).with_rows(rows, fit.memory)
+        state = self._filter  # the size of the model error is kept
+        kept = max(len(state.increases) - len(state.question.rows), 0)
+        self._filter = FilterState(
+            window,
+            repeated=state.repeated,
+            increases=state.increases[:kept],
+            rows_since_change=window.memory.rows,
+            variance=state.variance,
+        )
         self._fit = fit
         each_other = "agree" if agree else "do not agree either"
         words = f"the last {count} rows {each_other} with each other, and not with {earlier} before"
@@ -298,15 +310,16 @@ class SoilTracker:
         first = self._split(window)
         if 0 < first < blocks:
             recent = window.since(first)
-            old = fit_memory(self._judge, window.before(first))
+            old = fit_memory(self._judge, join(window.blocks[:first]))
             new = fit_memory(self._judge, recent.memory)
             apart = old.misfit + new.misfit
             unknowns = len(self.estimator.names)
             # not that of the last rows one by one, which another soil raises
             excess = max(excess_noise(apart, self._fit.readings, 2 * unknowns), 1.0)
-            limit = excess * chi_squared_limit(unknowns + ERROR_DEGREES, CHANGE_QUANTILE)
+            limit = excess * chi_squared_quantile(unknowns + ERROR_DEGREES, CHANGE_QUANTILE)
             if self._fit.misfit - apart > limit:
-                window = recent.with_another_soil()
+                # what rows added to the misfit was of the other soil
+                window = replace(recent, added=(0.0,) * len(recent.added))
                 self._filter = replace(state, window=window, rows_since_drift=0)
                 self._fit = new
                 words = (
@@ -314,7 +327,7 @@ class SoilTracker:
                     "before, so that soil or sensors drift: these are forgotten"
                 )
                 return self._answer(Event.DRIFT, words)
-        if window.is_full:
+        if window.memory.rows > window.length + window.rows_per_block:
             self._filter = replace(state, window=window.since(1))
             self._fit = fit_memory(self._judge, self._filter.window.memory)
         return self._answer(Event.ACCEPTED, words)
@@ -349,7 +362,8 @@ class SoilTracker:
         """From the rows that are remembered, with errors of the model and noise as rows show it."""
         memory, variance = self._filter.window.memory, self._filter.variance
         if self._estimated is None or self._estimated[0] is not memory:
-            fit = fit_memory(self.estimator, with_noise(memory, variance))
+            noisy = replace(memory, system=memory.system / np.sqrt(variance))
+            fit = fit_memory(self.estimator, noisy)
             sets, session = self.estimator.sets, self.estimator.session
             assert sets is not None
             checked = with_exact_check(fit.estimate, sets, session, memory, self._fit.estimate)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_estimates import made_estimate
 
-from soilml.onboard.estimate import PriorSummary
+from soilml.onboard.gaussian_product import PriorSummary
 from soilml.onboard.set_contract import (
     ABSENT_READING,
     ABSENT_STD,

@@ -5,7 +5,8 @@ import pytest
 from made_estimates import made_estimate
 
 from soilml.errors import InputError
-from soilml.onboard.estimate import PriorSummary, Reason
+from soilml.onboard.estimate import Reason
+from soilml.onboard.gaussian_product import PriorSummary
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.joint_errors import joint_errors
 from soilml.onboard.multi_sensor import fuse_estimates

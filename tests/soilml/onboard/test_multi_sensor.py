@@ -7,7 +7,7 @@ import pytest
 from made_estimates import made_estimate
 
 from soilml.errors import InputError
-from soilml.onboard.estimate import PriorSummary
+from soilml.onboard.gaussian_product import PriorSummary
 from soilml.onboard.multi_sensor import fuse_estimates
 
 PRIOR = PriorSummary(np.asarray([0.3]), np.asarray([0.15]), np.asarray([-0.3]), np.asarray([0.9]))

@@ -7,7 +7,8 @@ import pytest
 from conftest import THREE_CHANNEL_MODEL
 
 from soilml import SlipSinkage, read_case, simulate
-from soilml.onboard.estimate import Estimate, PriorSummary
+from soilml.onboard.estimate import Estimate
+from soilml.onboard.gaussian_product import PriorSummary
 from soilml.quantities import SHEAR
 from training.adaptation.judgement import BoardCandidate, judge
 

@@ -1,9 +1,8 @@
-"""What files of slip carry of their errors: rows, and the share in common."""
+"""What files of slip carry of their errors."""
 
 import numpy as np
-import pytest
 
-from training.calibration.held_out import common_share, measure_held_out
+from training.calibration.recalibration import measure_held_out
 from training.dataset import Dataset
 
 
@@ -35,10 +34,7 @@ def sensor(share, data):
     return mean, np.full_like(mean, 0.1)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("share", [0.2, 0.6, 0.95])
-def test_the_share_of_error_in_common_is_found(share):
+def test_a_file_carries_one_row_of_each_run():
     data = steady_rows()
-    estimates = sensor(share, data)
-    assert common_share(*estimates, data)[0] == pytest.approx(share, abs=0.06)
-    assert len(measure_held_out(*estimates, data).rows) == 1000
+    found = measure_held_out(*sensor(0.6, data), data)
+    assert len(found.rows) == 1000 and len({*data.run[np.isin(data.row, found.rows)]}) == 1000

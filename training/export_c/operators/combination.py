@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import prod
 
+from soilml.errors import ModelFileError
 from training.export_c.c_text import at, indices_of, nest, number, offset
-from training.export_c.operators.rearrangement import transposed
 from training.export_c.program import Node, Program, Translation
 from training.export_c.tensor import Shape, Tensor, broadcast, strides
 
@@ -17,18 +17,15 @@ REDUCTIONS = {
 
 
 def translate_gemm(program: Program, node: Node) -> list[Tensor]:
-    """`alpha a b + beta c` of two matrices, either of which may be transposed."""
+    """`alpha a b + c` of two matrices, one of which may be transposed."""
     a, b, c = program.stored(node.input(0)), program.stored(node.input(1)), node.optional(2)
     transpose_a, transpose_b = (int(node.attributes.get(k, 0)) for k in ("transA", "transB"))
     alpha, beta = (float(node.attributes.get(k, 1.0)) for k in ("alpha", "beta"))
-    if transpose_a and transpose_b:
-        a, transpose_a = transposed(program, a, [1, 0]), 0
+    if (transpose_a and transpose_b) or beta != 1.0:
+        raise ModelFileError("this form of operator Gemm is not known to export c")
     m, k = (a.shape[1], a.shape[0]) if transpose_a else a.shape
     n = b.shape[0] if transpose_b else b.shape[1]
-    text = number(0.0, a.kind)
-    if c is not None and beta:
-        text = "{0}" if beta == 1.0 else f"{number(beta, a.kind)} * {{0}}"
-    given = [] if c is None or not beta else [c]
+    text, given = (number(0.0, a.kind), []) if c is None else ("{0}", [c])
     out = program.stored(program.computed(a.kind, (m, n), text, given))
     steps = (1, m) if transpose_a else (k, 1)
     code = _product(program, (m, k, n), alpha, (a, "0", *steps), (b, "0"), (out, "0"), transpose_b)
@@ -80,24 +77,19 @@ def _product(
 
 
 def translate_reduction(program: Program, node: Node) -> list[Tensor]:
-    """A reduction over some axes or all."""
+    """A reduction over one axis or all."""
     x = program.stored(node.input(0))
-    listed = node.numbers(1, "axes")
-    if not listed and int(node.attributes.get("noop_with_empty_axes", 0)):
-        return [x]
-    axes = sorted({axis % x.rank for axis in listed}) if listed else list(range(x.rank))
-    kept = [axis for axis in range(x.rank) if axis not in axes]
-    if int(node.attributes.get("keepdims", 1)):
-        shape = tuple(1 if axis in axes else size for axis, size in enumerate(x.shape))
-    else:
-        shape = tuple(x.shape[axis] for axis in kept)
-    if axes != list(range(axes[0], axes[-1] + 1)) if axes else False:
-        x = transposed(program, x, kept + axes)
-        axes = list(range(len(kept), x.rank))
-    if not axes:
-        return [x.seen_as(shape)]
-    before, along = prod(x.shape[: axes[0]]), prod(x.shape[axes[0] : axes[-1] + 1])
-    after, out = prod(x.shape[axes[-1] + 1 :]), program.new(x.kind, shape)
+    listed = node.numbers(1, "axes") or list(range(x.rank))
+    if len(listed) not in (1, x.rank):
+        raise ModelFileError(f"operator {node.kind} over several axes is not known to export c")
+    first = listed[0] % x.rank if len(listed) == 1 else 0
+    last = first + len(listed)
+    kept = [1] * len(listed) if int(node.attributes.get("keepdims", 1)) else []
+    shape = (*x.shape[:first], *kept, *x.shape[last:])
+    before, along, after = (
+        prod(part) for part in (x.shape[:first], x.shape[first:last], x.shape[last:])
+    )
+    out = program.new(x.kind, shape)
     kernel = program.shared.kernel(REDUCTIONS[node.kind], x.kind)
     i, j = indices_of([before, after])
     source, target = offset([along * after, 1], [i, j]), offset([after, 1], [i, j])

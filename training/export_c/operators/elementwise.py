@@ -48,18 +48,16 @@ def translate_function(program: Program, node: Node) -> list[Tensor]:
 
 def translate_expression(program: Program, node: Node) -> list[Tensor]:
     """An expression of one, two or three operands, or of several in turn."""
-    text, given = KEEPING[node.kind], node.given()
+    given = node.given()
+    if node.kind in TRUTH:
+        return _computed(program, "bool", TRUTH[node.kind], given)
+    text = KEEPING[node.kind]
     if node.kind not in REPEATED:
         return _computed(program, given[-1].kind, text, given)
     first, *others = given
     for other in others:
         (first,) = _computed(program, first.kind, text, [first, other])
     return [first]
-
-
-def translate_truth(program: Program, node: Node) -> list[Tensor]:
-    """Comparisons and logical operators."""
-    return _computed(program, "bool", TRUTH[node.kind], node.given())
 
 
 def translate_clip(program: Program, node: Node) -> list[Tensor]:
@@ -83,8 +81,7 @@ def translate_cast(program: Program, node: Node) -> list[Tensor]:
 
 OPERATORS: dict[str, Translation] = {
     **dict.fromkeys(FUNCTIONS, translate_function),
-    **dict.fromkeys(KEEPING, translate_expression),
-    **dict.fromkeys(TRUTH, translate_truth),
+    **dict.fromkeys((*KEEPING, *TRUTH), translate_expression),
     "Clip": translate_clip,
     "Cast": translate_cast,
 }

@@ -115,11 +115,6 @@ def translate_shaping(program: Program, node: Node) -> list[Tensor]:
     return [x.seen_as(tuple(1 if k in axes else next(own) for k in range(rank)))]
 
 
-def translate_identity(program: Program, node: Node) -> list[Tensor]:
-    """The tensor itself."""
-    return [node.input(0)]
-
-
 def translate_shape(program: Program, node: Node) -> list[Tensor]:
     """The sizes of a tensor."""
     first, last = int(node.attributes.get("start", 0)), node.attributes.get("end")
@@ -161,6 +156,6 @@ OPERATORS: dict[str, Translation] = {
     "Transpose": translate_transpose,
     "Expand": translate_expand,
     **dict.fromkeys(("Reshape", "Unsqueeze"), translate_shaping),
-    "Identity": translate_identity,
+    "Identity": lambda program, node: [node.input(0)],
     "Shape": translate_shape,
 }
