@@ -97,10 +97,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _init(args: argparse.Namespace) -> int:
     import shlex
+    from contextlib import suppress
 
     from soilml.cli.output import tell, write_stdout
     from soilml.cli.progress import stage_progress
     from soilml.log_import.guesses.map_guess import draft_map
+    from soilml.log_import.soil_tests import read_soil_tests
 
     with stage_progress() as progress:
         draft = draft_map(args.files, progress)
@@ -115,4 +117,8 @@ def _init(args: argparse.Namespace) -> int:
     logs = [str(file) for file in args.files]
     shown = shlex.join(logs) if len(logs) <= _MOST_NAMED else "LOG..."
     tell(f"{args.out} written; {todo}; then: soilml import {shown} --map {args.out} --out runs.csv")
+    if len(logs) == 1 and "each_row = true" in draft.text:
+        with suppress(InputError):  # of a table that is none of tests
+            if read_soil_tests(logs[0]):
+                tell(f"plate or shear tests without a wheel are for: soilml bevameter {shown}")
     return 0

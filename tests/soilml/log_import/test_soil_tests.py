@@ -92,6 +92,9 @@ def test_the_command_says_what_it_took_and_leaves_out(tmp_path, capsys):
     out, err = capsys.readouterr()
     assert "plate_radius_m = 'b' (mm), sinkage_m = 'z' (mm), pressure_Pa = 'p' (kPa)" in err
     assert "left out: 'T air'" in err and "kphi" in out
+    table, draft = str(tmp_path / "tests.csv"), str(tmp_path / "map.toml")
+    assert main(["import", table, "--init", "--out", draft]) == 0
+    assert f"soilml bevameter {table}" in capsys.readouterr().err
     # values are held to the same limits as those of our own columns
     assert (
         main(["bevameter", str(written(tmp_path, "\n".join(lines).replace("B,75", "B,-1")))]) == 2
