@@ -56,7 +56,7 @@ def named_numbers(texts: Sequence[str], option: str, needed: str) -> dict[str, f
     """Numbers by name from texts NAME=NUMBER; raises `InputError`, with what is `needed`."""
     found = {}
     for text in texts:
-        name, _, number = text.rpartition("=")
+        name, _, number = map(str.strip, text.rpartition("="))
         try:
             found[name] = read_number(number)
         except ValueError:

@@ -67,7 +67,9 @@ def with_suspects_explained(content: dict[str, Any]) -> dict[str, Any]:
     tables = {"": content, **(gears if isinstance(gears, dict) else {})}
     marked, left = [], dict(content)
     for gear, table in tables.items():
-        entries = table.get("effect", []) if isinstance(table, dict) else []
+        entries = table.get("effect") if isinstance(table, dict) else None
+        if not isinstance(entries, list) or "explanation" in content:
+            continue  # what is wrong is said where it is read
         own = [e for e in entries if isinstance(e, dict) and e.get("suspected") is True]
         if not own:
             continue

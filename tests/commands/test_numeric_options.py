@@ -10,7 +10,7 @@ from conftest import THREE_CHANNEL_MODEL
 
 from soilml.cli import main
 from soilml.cli.main import parser
-from soilml.cli.option_values import NumberFrom
+from soilml.cli.option_values import NumberFrom, named_numbers
 from soilml.cli.options import leaves
 
 HOSTILE = ["nan", "inf", "-inf", "0", "-1", "1e-9", "1e9", "-1e9", "1e400", "x", ""]
@@ -103,3 +103,7 @@ def test_a_command_answers_or_refuses_whatever_number_it_is_given(
         else:
             words += [f"{option}={text}"]
         run(words, folder, monkeypatch, capsys)
+
+
+def test_a_named_number_may_have_blanks_about_its_sign():
+    assert named_numbers(["n = 0.7"], "--assume", "NAME=VALUE") == {"n": 0.7}

@@ -101,6 +101,11 @@ def test_a_suspected_effect_of_an_earlier_file_is_its_only_explanation(tmp_path)
     case = case_of(tmp_path, marked, with_explanations=True)
     assert case.model.effects == () and [e.weight for e in case.explanations] == [1.0]
     assert [e.name for e in case_of(tmp_path, marked).model.effects] == ["slip-sinkage"]
+    stated = '[[explanation]]\nweight = 1.0\neffect = [{ name = "bulldozing" }]\n'
+    wrong = "effect = 3\n" + UNNAMED + '[soil]\nname = "wong1989/dry_sand"\n'
+    for text, said in ((wrong, "tables"), (marked + stated, "suspected")):
+        with pytest.raises(InputError, match=said):
+            case_of(tmp_path, text, with_explanations=True)
 
 
 def test_parameters_of_gears_are_set_by_path(tmp_path):
