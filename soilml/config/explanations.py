@@ -61,13 +61,17 @@ class CaseExplanation:
 def with_suspects_explained(content: dict[str, Any]) -> dict[str, Any]:
     """The content of a model file whose effects with `suspected = true` are its only explanation.
 
-    `gap` of earlier versions marked so what predicts and is not named; [[explanation]] says it now.
+    `gap` of earlier versions marked so what predicts and is not named; [[explanation]] says it now,
+    and beside one the mark is refused as an unknown key.
     """
+    if "explanation" in content:
+        return content
     gears = content.get("gears")
     tables = {"": content, **(gears if isinstance(gears, dict) else {})}
     marked, left = [], dict(content)
     for gear, table in tables.items():
-        entries = table.get("effect", []) if isinstance(table, dict) else []
+        entries = table.get("effect") if isinstance(table, dict) else None
+        entries = entries if isinstance(entries, list) else []  # others are refused where read
         own = [e for e in entries if isinstance(e, dict) and e.get("suspected") is True]
         if not own:
             continue

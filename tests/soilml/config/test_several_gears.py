@@ -101,6 +101,10 @@ def test_a_suspected_effect_of_an_earlier_file_is_its_only_explanation(tmp_path)
     case = case_of(tmp_path, marked, with_explanations=True)
     assert case.model.effects == () and [e.weight for e in case.explanations] == [1.0]
     assert [e.name for e in case_of(tmp_path, marked).model.effects] == ["slip-sinkage"]
+    with pytest.raises(InputError, match="unknown key 'suspected'"):
+        case_of(tmp_path, marked + "\n[[explanation]]\nweight = 0.4\n")
+    with pytest.raises(InputError, match=r"effect is 3; needed is tables \[\[effect\]\]"):
+        case_of(tmp_path, "effect = 3\n" + GEARS + REST.partition("[[effect]]")[0])
 
 
 def test_parameters_of_gears_are_set_by_path(tmp_path):
