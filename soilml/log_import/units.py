@@ -54,8 +54,8 @@ _EXACT = {"mNm": "mN*m", "MNm": "MN*m", "Nm": "N*m", "kNm": "kN*m", "G": "g_0", 
 _SUFFIXES = (
     "deg_s rad_s m_s mm_s cm_s m_s2 counts ticks rpm mnm nm rad deg degs mm cm ma ms us ns sec "
     "secs percent pct kgf mps mmps rps dps radps n m a s kg kn turns rev v lbf degps ncm newton "
-    "newtons amps inc mn mm_min cm_min m_min mv uv pa kpa mpa psi nmm kmh kph km_h mph ft_s in_s "
-    "ft n_m n_cm n_mm lbf_ft lbf_in ft_lbf"
+    "newtons amps inc mn mm_min cm_min m_min mv uv pa kpa mpa psi nmm kmh kph km_h mph ft_s ft "
+    "n_m n_cm n_mm lbf_ft lbf_in ft_lbf"
 )
 #: Per cent of something that a data sheet states.
 _SHARE = re.compile(
@@ -98,7 +98,8 @@ def spelling(unit: str) -> str:
 
 def unit_in_name(name: str) -> str:
     """The unit that ends a name such as torque_Nm, v_mm_s or current_mA; "" without one."""
-    words = [word for word in re.split(r"[_\s.\-]+", name) if word.lower() != "per"]
+    first, *others = re.split(r"[_\s.\-]+", name)
+    words = [first, *(word for word in others if word.lower() != "per")]
     for count in (2, 1):
         tail = words[-count:]
         if count == 2 and tail[-1].lower() in ("sec", "second"):

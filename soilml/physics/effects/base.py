@@ -147,7 +147,7 @@ def effect(name: str, **card: Any) -> Callable[[type[E]], type[E]]:
     """
 
     def made(cls: type[E]) -> type[E]:
-        said = (cls.__doc__ or name).partition("\n")[0].rstrip(".")
+        said = ((cls.__doc__ or "").strip() or name).partition("\n")[0].rstrip(".")
         cls.name, cls.about = name, EffectCard(**{"text": said[0].lower() + said[1:]} | card)
         return dataclass(frozen=True, kw_only=True)(cls)
 

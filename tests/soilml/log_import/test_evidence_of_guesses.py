@@ -7,6 +7,7 @@ from guessed_channels import LOOKED_AT, RIGHT, SILENT, is_marked, judged_rigs, p
 from rig_tables import write
 
 from soilml.cli import main
+from soilml.log_import.units import unit_in_name
 from soilml.optional_imports import tomllib
 
 ROLES = ("wheel_speed", "wheel_angle", "rim_speed", "ground_speed", "position", "slip", "torque",
@@ -352,3 +353,11 @@ def test_units_at_the_end_of_names_and_a_distance_without_a_rest(tmp_path):
     assert units == {"wheel_speed": "deg/s", "ground_speed": "ft/s", "torque": "N_m"}
     assert silent(text).keys() == {"wheel_speed", "ground_speed"}
     assert "no rest shows where the surface is" in text and "its name is of a whole" in text
+
+
+@pytest.mark.parametrize(
+    "name, unit",
+    [("time_in_s", "s"), ("v_m_per_s", "m/s"), ("gap in ft", "ft"), ("per", ""), ("Per-per", "")],
+)
+def test_the_unit_that_ends_a_name(name, unit):
+    assert unit_in_name(name) == unit

@@ -64,6 +64,13 @@ def test_a_changed_file_is_read_again_and_nothing_is_left_beside_it(own):
     assert [path.name for path in own.parent.iterdir()] == ["my-effects.py"]
 
 
+def test_the_text_is_by_default_the_first_line_of_the_docstring(own):
+    with_text = OWN.replace('    text="a crust carries a part of the load",\n', "")
+    for doc in ('"""A crust carries', '"""\n    A crust carries'):
+        own.write_text(with_text.replace('"""A crust carries', doc))
+        assert load_effects(own)["crust"].about.text == "a crust carries a part of the load"
+
+
 DECLARED = OWN[OWN.index("@effect") : OWN.index("class Crust")]
 
 
