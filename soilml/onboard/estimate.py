@@ -12,7 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.onboard.gaussian_product import PriorSummary, gaussian_product, narrowed
+from soilml.onboard.gaussian_product import (
+    PriorSummary,
+    distance_to_box,
+    gaussian_product,
+    narrowed,
+)
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.set_contract import Floats
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90, column
@@ -23,7 +28,7 @@ if TYPE_CHECKING:
 
 #: A mean closer to an end of the prior than so many standard deviations is at the edge.
 EDGE_STDS = 1.5
-#: A mean that lies this many standard deviations beyond a narrower prior contradicts it.
+#: Standard deviations from the means at which a narrower prior contradicts them.
 CONTRADICTION = 3.72
 
 
@@ -261,9 +266,9 @@ class Estimate(Result):
         -------
         Estimate
             Its `prior` is the narrower one, whose mean and covariance take the place of the wider
-            one's (`gaussian_product`). Where a mean is `CONTRADICTION` standard deviations beyond
-            the box, the readings contradict it: `in_range` is false, and the answer is the narrower
-            prior, as it is where the estimate was the prior.
+            one's (`gaussian_product`). Where the box is `CONTRADICTION` standard deviations from
+            the means, the readings contradict it: `in_range` is false, and the answer is the
+            narrower prior, as it is where the estimate was the prior.
 
         Raises
         ------
@@ -281,9 +286,10 @@ class Estimate(Result):
         """
         prior = narrowed(self.prior, self.names, self.units, box)
         lower, upper = prior.lower, prior.upper
-        beyond = np.maximum(lower - self.mean, self.mean - upper) > CONTRADICTION * self.std
         informed = self.in_range | (self.reason == Reason.INCONSISTENT)
-        contradicted = informed & beyond.any(axis=-1)
+        contradicted = informed & (
+            distance_to_box(self.mean, self.covariance, prior) > CONTRADICTION
+        )
         found = Estimate.from_prior(self.names, self.units, prior, np.shape(self.in_range))
         for at in np.ndindex(np.shape(self.in_range)):
             if informed[at] and not contradicted[at]:

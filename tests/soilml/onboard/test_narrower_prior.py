@@ -69,6 +69,17 @@ def test_readings_that_contradict_it_are_flagged(rover):
     assert found.abstains.all()
 
 
+def test_quantities_contradict_a_box_together(rover):
+    wide = rover.on(model_error=0.0).run(
+        **readings(np.random.default_rng(4), [900.0, 0.6, 0.01], 24)
+    )
+    # cohesion and friction angle stand for each other: both cannot be above their means
+    ends = wide.mean + np.asarray([[1.5], [3.5]]) * wide.std
+    both = {name: tuple(ends[:, i]) for i, name in enumerate(SHEAR[:2])}
+    assert not wide.within(**both).in_range
+    assert all(wide.within(**{name: own}).in_range for name, own in both.items())
+
+
 def test_one_row_contradicts_no_box_with_its_soil(rover):
     truth = [1000.0, 0.6, 0.02]
     single = rover.run(**readings(np.random.default_rng(6), truth, 1))
