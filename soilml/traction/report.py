@@ -288,7 +288,11 @@ def _table_of_loads(loads: Sequence[TractionPrediction]) -> ReportTable:
             Column("load", [one.weight for one in known], "N"),
             Column.of_bands("largest pull", [quantile_band(k.largest_pull) for k in known], "N"),
             Column.of_bands("steepest slope", steepest, "rad"),
-            Column.of_bands("at slip", [quantile_band(k.strongest_slip) for k in known], digits=2),
+            Column.of_bands(
+                "slip of the largest pull",
+                [quantile_band(k.strongest_slip) for k in known],
+                digits=2,
+            ),
             Column.of_bands("pull before the rows", pulls, "N"),
         ],
     )
