@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from soilml.config.given_case import GivenCase, as_case
 from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
 from soilml.io.table import Table
+from soilml.physics.contact import Force
 from soilml.physics.operating_point import AFTER_CAMPAIGN, COVARIATES, Operating
 from soilml.physics.pull_efficiency import (
     has_thrust,
@@ -22,6 +24,8 @@ from soilml.physics.pull_efficiency import (
 )
 from soilml.quantities import CHANNELS, column
 from soilml.row_status import Status
+
+BLOCK = 65_536  # Rows that are solved at a time
 
 
 def simulate(
@@ -34,6 +38,7 @@ def simulate(
     slip_angle: float | None = None,
     run: ArrayLike | None = None,
     seed: int | None = None,
+    on_rows: Callable[[int], None] | None = None,
     with_std: bool = False,
     with_efficiency: bool = False,
 ) -> Table:
@@ -53,6 +58,8 @@ def simulate(
     seed
         Adds normal noise as the case declares it in [noise], with this seed; without one, readings
         are exact. An error of the model, [discrepancy], is not added.
+    on_rows
+        Called with the number of rows that are done.
     with_std
         Adds a column `<column>_std` for each channel that [remainder] has: the standard deviation
         of the model's error there. The mean of the remainder is in the readings anyway.
@@ -87,7 +94,15 @@ def simulate(
     used = {field for effect in case.model.effects for field in effect.about.uses}
     known |= {field: value for field, value in AFTER_CAMPAIGN.items() if field in used}
     slips, loads = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in (slip, load)))
-    force = forces_of_one_gear(case, Operating(slip=slips, load=loads, **known))
+    parts = []
+    for first in range(0, slips.size, BLOCK):
+        rows = slice(first, first + BLOCK)
+        at = Operating(slip=slips[rows], load=loads[rows], **known)
+        parts.append(forces_of_one_gear(case, at))
+        if on_rows is not None:
+            on_rows(min(rows.stop, slips.size))
+    names = [f.name for f in fields(Force)]
+    force = Force(**{n: np.concatenate([getattr(part, n) for part in parts]) for n in names})
     columns = {} if run is None else {"run": np.broadcast_to(np.asarray(run, str), slips.shape)}
     columns |= {"slip": slips, "load_N": loads}
     for field, value in known.items():

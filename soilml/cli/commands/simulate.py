@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.option_values import parse_numbers
     from soilml.cli.options import available_effects
     from soilml.cli.output import write_columns
-    from soilml.cli.progress import working
+    from soilml.cli.progress import progress_bar
     from soilml.config.case import read_case_of_one_gear
     from soilml.fitting.covariance import ignored_discrepancy
     from soilml.fitting.global_optimum import missing_peak
@@ -88,8 +88,8 @@ def run(args: argparse.Namespace) -> int:
     known = {"speed": args.speed, "pass_number": args.pass_, "slip_angle": angle}
     options: dict[str, Any] = {**known, "run": args.label, "with_std": args.std}
     options["with_efficiency"] = args.efficiency
-    with working(f"simulating {slip.size} rows"):
-        rows = simulate(case, slip, load, **options)
+    with progress_bar(f"simulating {slip.size} rows", slip.size) as done:
+        rows = simulate(case, slip, load, on_rows=done, **options)
     failed = int(np.count_nonzero(~rows.answered))
     if failed == slip.size:
         force = case.model(case.soil, Operating(slip=slip[:1], load=load[:1], **known))

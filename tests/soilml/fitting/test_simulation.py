@@ -8,15 +8,20 @@ import pytest
 from soilml import Noise, simulate
 from soilml.cli.output import save_columns
 from soilml.errors import InputError
+from soilml.fitting import simulation
 from soilml.io.read_table import read_table
 
 
-def test_rows_are_those_of_the_model_and_say_where_there_is_none(case):
+def test_rows_are_those_of_the_model_in_blocks_and_say_where_there_is_none(case, monkeypatch):
     slip, load = np.asarray([0.1, 0.3, 0.5]), np.asarray([30.0, 1e7, 90.0])
-    rows = simulate(case, slip, load, speed=0.05)
+    whole, counted = simulate(case, slip, load), []
+    monkeypatch.setattr(simulation, "BLOCK", 2)
+    rows = simulate(case, slip, load, speed=0.05, on_rows=counted.append)
     assert simulate(case, 0.1, 60.0, run="one")["run"].tolist() == ["one"]
-    assert rows["speed_m_s"].tolist() == [0.05] * 3
+    assert counted == [2, 3] and rows["speed_m_s"].tolist() == [0.05] * 3
     assert rows.answered.tolist() == [True, False, True] and np.isnan(rows["torque_Nm"][1])
+    for name in ("torque_Nm", "drawbar_pull_N", "sinkage_m", "entry_angle_rad"):
+        np.testing.assert_allclose(rows[name], whole[name], rtol=1e-9)
 
 
 def test_efficiencies_are_of_driving_rows_and_are_passed_over_by_readers(case, tmp_path):
