@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 #: Warnings that an exported file must not cause.
 WARNINGS = [
     *("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror"),
-    *("-Wconversion", "-Wfloat-equal"),
+    *("-Wconversion", "-Wfloat-equal", "-Wshadow"),
 ]
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 PLAIN = (int, ctypes.Array, ctypes.c_float)  # Arguments that are not passed by reference

@@ -135,14 +135,13 @@ def test_a_pull_that_a_sinking_wheel_loses_with_slip_is_no_turned_sign():
 
 
 @pytest.mark.slow
-def test_identify_estimate_and_gap_give_the_same_hint(tmp_path, model_file, capsys):
+def test_identify_and_estimate_give_the_same_hint(tmp_path, model_file, capsys):
     lines = [f"a,{s},{LOAD / 9.81:.4f},{t:.4f}" for s, t in zip(*rows_of_torque(), strict=True)]
     runs = tmp_path / "runs.csv"
     runs.write_text("run,slip,load_N,torque_Nm\n" + "\n".join(lines) + "\n")
     model = str(model_file)
     for command in (
         ["identify", model, str(runs), "--method", "nonlinear"],
-        ["gap", model, str(runs), "--out", str(tmp_path / "found")],
         ["estimate", "exported/any_wheel.onnx", str(runs), "--model", model, "--by", "run"],
     ):
         main(command)

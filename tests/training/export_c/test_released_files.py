@@ -36,8 +36,8 @@ def test_the_lists_of_this_file_cover_all_released_files():
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("name", RELEASED)
 def test_it_compiles_without_a_warning(name, compiler, exported):
-    """`library` compiles most files for other tests, with warnings of their flow."""
-    command = [compiler, *WARNINGS, "-O2", "-c", exported(name) / f"{name}.c", "-o", "/dev/null"]
+    """`library` compiles them for other tests, with warnings of their flow."""
+    command = [compiler, *WARNINGS, "-fsyntax-only", exported(name) / f"{name}.c"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0 and done.stderr == "", done.stderr[:2000]
 

@@ -70,7 +70,7 @@ def known_to(count):
 
 @cache
 def plain(gear):
-    return solved(input_box(128, seed=4), gear=GEARS[gear], **known_to(128))
+    return solved(input_box(64, seed=4), gear=GEARS[gear], **known_to(64))
 
 
 def is_described(name):
@@ -181,16 +181,16 @@ def answers_a_row_alike_alone_and_among_others(name):
 
 
 def is_neutral_by_default_to_the_last_bit(name):
-    box = input_box(128, seed=4)
+    box = input_box(64, seed=4)
     assert (box["slip"] < 0).any() and (box["slip"] > 0).any()
     for gear in wheels(name):
-        neutral = solved(box, [EFFECTS[name]()], GEARS[gear], **known_to(128))
+        neutral = solved(box, [EFFECTS[name]()], GEARS[gear], **known_to(64))
         for field in FORCES:
             assert getattr(neutral, field).tobytes() == getattr(plain(gear), field).tobytes(), field
 
 
 def is_finite_over_the_whole_box_or_flagged(name):
-    box, known = input_box(256, seed=8), known_to(256)
+    box, known = input_box(128, seed=8), known_to(128)
     for gear, share in product(wheels(name), (0.5, 2.0)):
         effect = sized(name, share)
         force = solved(box, [effect], GEARS[gear], **known)
