@@ -1,11 +1,11 @@
-"""Slip, torque, load and the other quantities of a wheel from its channels, the map and its gears;
+"""Slip, torque, load and the other quantities of a wheel from its channels and the map;
 errors that all rows share, from the uncertain constants of the map.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -13,10 +13,8 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.measurement_noise import KNOWN_PARTS, Noise
-from soilml.errors import InputError, did_you_mean
-from soilml.log_import.channels.runs import Run
 from soilml.log_import.mapping.channel_map import GEARED, Uncertain
-from soilml.log_import.mapping.log_map import LogMap, Vehicle, WheelMap
+from soilml.log_import.mapping.log_map import Vehicle, WheelMap
 from soilml.quantities import COLUMNS, column
 
 #: Names of the offset and of the share that [bias] of a model file can state of a quantity.
@@ -241,51 +239,3 @@ def slope_of(columns: Sequence[Floats]) -> Floats:
     with np.errstate(invalid="ignore", divide="ignore"):
         rise = 2.0 * (x * z - w * y) / (x**2 + y**2 + z**2 + w**2)
     return np.arcsin(np.clip(rise, -1.0, 1.0))
-
-
-def gear_of(wheel: WheelMap, run: Run) -> str:
-    """The gear of a wheel in a run; "" where the map states none.
-
-    Raises `InputError` where neither the name of the run nor that of its file has it.
-    """
-    if wheel.gear_pattern is None:
-        return wheel.gear
-    for text in (run.name, run.recordings[0].file.name):
-        if match := wheel.gear_pattern.search(text):
-            return match[match.re.groups]
-    raise InputError(
-        f"[wheel] gear_from {wheel.gear_pattern.pattern!r} finds nothing in the name of the run "
-        f"{run.name!r}, nor in {run.recordings[0].file.name!r}"
-    )
-
-
-def wheels_by_gear(
-    log_map: LogMap, wheel: WheelMap, runs: Sequence[Run]
-) -> list[tuple[WheelMap, list[int]]]:
-    """The wheel with each gear that it had, with the gear's radius, and the indices of its runs.
-
-    One wheel with all runs where the map has no [gears]. Names of gears are compared whatever the
-    case of their letters.
-
-    Raises `InputError` where a run has a gear that [gears] lacks, and no other radius is given; and
-    as `gear_of` does.
-    """
-    if not log_map.gears or wheel.gear_pattern is None:
-        return [(wheel, list(range(len(runs))))]
-    names = {name.casefold(): name for name in log_map.gears}
-    found: dict[str, list[int]] = {}
-    for i, run in enumerate(runs):
-        gear = gear_of(wheel, run)
-        known = names.get(gear.casefold())
-        if known is None and wheel.radius is None:
-            raise InputError(
-                f"{log_map.source}: run {run.name!r} has the gear {gear!r}, and [gears] does not; "
-                f"{did_you_mean(gear, names.values())}there are {', '.join(log_map.gears)}; add "
-                f"[gears.{gear}] with its radius, or correct gear_from"
-            )
-        found.setdefault(known or gear, []).append(i)
-    return [
-        (replace(wheel, gear=gear, gear_pattern=None,
-                 radius=log_map.gears.get(gear, wheel.radius)), own)
-        for gear, own in found.items()
-    ]  # fmt: skip
