@@ -88,7 +88,7 @@ def import_log(
         raise FitError(f"{found.source}: no steady window can be used: {_most_frequent(wheels)}")
     remarks = remarks[: _MOST_LEFT if steady else None]
     remarks += [*_lacks(table, steady), *_several_wheels(table, recordings)]
-    bias, shared = largest_errors([wheel.shared_errors() for wheel in wheels])
+    bias = largest_errors([wheel.shared_errors() for wheel in wheels])
     radii = {wheel.wheel.radius.value if wheel.wheel.radius else None for wheel in wheels}
     radius = radii.pop() if len(radii) == 1 else None
     for one in by_run:
@@ -96,7 +96,6 @@ def import_log(
     return ImportedLog(
         table=table,
         bias=bias,
-        shared=tuple(shared),
         series=() if steady else tuple(by_run),
         remarks=tuple(dict.fromkeys(remarks)),
         implausible=tuple(wrong),

@@ -22,15 +22,6 @@ _FORMS = {COLUMNS[key].name: parts for key, parts in KNOWN_PARTS.items()}
 
 
 @dataclass(frozen=True)
-class SharedError:
-    """The effect of one uncertain constant on one quantity of the rows: its rms change."""
-
-    constant: str
-    quantity: str
-    rms: float
-
-
-@dataclass(frozen=True)
 class Conversion:
     """From channels of a wheel to its quantities, by the constants of its map."""
 
@@ -124,10 +115,8 @@ class Conversion:
         found |= {role: read(role) for role in ("vibration", "slope") if role in channels}
         return {name: np.asarray(values, dtype=np.float64) for name, values in found.items()}
 
-    def shared_errors(
-        self, means: Mapping[str, Floats]
-    ) -> tuple[dict[str, Noise], list[SharedError]]:
-        """The errors that rows share, by column, and what each constant adds to them.
+    def shared_errors(self, means: Mapping[str, Floats]) -> dict[str, Noise]:
+        """The errors that rows share, by column.
 
         means: Channels of the rows (rows,).
         Each constant is changed by one standard deviation. The change of a quantity counts as
@@ -136,7 +125,6 @@ class Conversion:
         """
         usual = self.of(means)
         bias: dict[str, Noise] = {}
-        parts = []
         for name, constant in self.constants.items():
             if constant.std == 0.0:
                 continue
@@ -151,7 +139,6 @@ class Conversion:
                 if not np.any(change):
                     continue
                 rms, size = (float(np.sqrt(np.mean(x**2))) for x in (change, reading))
-                parts.append(SharedError(name, key, rms))
                 has_offset, has_share = _FORMS[key]
                 gain = float(change @ reading) / (len(reading) * size**2) if size else 0.0
                 by_share, by_offset = (
@@ -164,22 +151,20 @@ class Conversion:
                 one = Noise(share=rms / size) if as_share else Noise(constant=rms)
                 bias[column(key)] = _joined(bias.get(column(key), Noise()), one, np.hypot)
         order = [column(key) for key in _FORMS if column(key) in bias]
-        return {key: bias[key] for key in order}, parts
+        return {key: bias[key] for key in order}
 
 
 def _joined(one: Noise, other: Noise, how: Any) -> Noise:
     return Noise(float(how(one.constant, other.constant)), float(how(one.share, other.share)))
 
 
-def largest_errors(
-    found: Sequence[tuple[Mapping[str, Noise], Sequence[SharedError]]],
-) -> tuple[dict[str, Noise], list[SharedError]]:
+def largest_errors(found: Sequence[Mapping[str, Noise]]) -> dict[str, Noise]:
     """Shared errors of several wheels as one table [bias], which their rows share: the largest."""
     bias: dict[str, Noise] = {}
-    for own, _ in found:
+    for own in found:
         for key, noise in own.items():
             bias[key] = _joined(bias.get(key, noise), noise, max)
-    return bias, [part for _, parts in found for part in parts]
+    return bias
 
 
 def slip_ratio(rim: Any, ground: Any) -> Any:

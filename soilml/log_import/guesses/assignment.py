@@ -1,8 +1,7 @@
 """Which column is taken for which role, for one wheel or for several.
 
 Axes of a force sensor lie as somebody has mounted it, so that x, y and z say little. On a wheel
-that drives, the largest steady force is the load. The torque and the pull vary together, beside
-what either has of the load.
+that drives, the largest steady force is the load. The torque and the pull vary together.
 """
 
 from __future__ import annotations
@@ -328,19 +327,14 @@ def _pair(
     driving: NDArray[np.bool_],
     load: str,
 ) -> tuple[str, str, float]:
-    """Pull and torque: the force and the moment that vary most together, and their correlation.
-
-    What varies with the load is taken off first: lateral forces and the moments that they make.
-    """
-    weight = means[load] if load else np.zeros(driving.size)
-    size = abs(float(np.median(weight[driving])))
-    left = {address: _beside(means[address], weight) for address in (*pulls, *turning)}
-    spread = {address: float(np.std(own)) for address, own in left.items()}
+    """Pull and torque: the force and the moment that vary most together, and their correlation."""
+    size = abs(float(np.median(means[load][driving]))) if load else 0.0
+    spread = {address: float(np.std(means[address])) for address in (*pulls, *turning)}
     lively = [a for a in pulls if spread[a] > _VARIES * size]
     best, most, correlation = ("", ""), 0.0, 0.0
     for f in lively:
         for m in (t for t in turning if spread[t] > 0.0):
-            common = abs(float(np.corrcoef(left[f], left[m])[0, 1]))
+            common = abs(float(np.corrcoef(means[f], means[m])[0, 1]))
             if common * spread[f] * spread[m] > most:
                 best, most, correlation = (f, m), common * spread[f] * spread[m], common
     if correlation >= _TOGETHER_FROM:
@@ -350,12 +344,3 @@ def _pair(
         max(turning, key=lambda a: spread[a], default=""),
         0.0,
     )
-
-
-def _beside(own: Floats, weight: Floats) -> Floats:
-    """What of a column (n,) does not follow from the load (n,)."""
-    rest = np.asarray(own - own.mean())
-    if float(np.std(weight)) <= 0.05 * abs(float(weight.mean())):
-        return rest  # nothing of note: the load did not change
-    share = weight - weight.mean()
-    return np.asarray(rest - share * float(share @ rest) / float(share @ share))

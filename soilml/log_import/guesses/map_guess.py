@@ -12,7 +12,7 @@ from soilml.log_import.channels.runs import run_names, runs_of
 from soilml.log_import.guesses.assignment import assign, axle_of, by_behaviour
 from soilml.log_import.guesses.channel_drafts import add_errors, draft_channels, is_error
 from soilml.log_import.guesses.clocks_and_runs import Division, divide, refuse_a_table_of_runs
-from soilml.log_import.guesses.columns import candidates_of, describe, liveliest
+from soilml.log_import.guesses.columns import candidates_of, describe
 from soilml.log_import.guesses.constants import agreed_constants, number_in_names, stated_radius
 from soilml.log_import.guesses.draft import Draft, driving_means, implied_radius, inputs_of
 from soilml.log_import.guesses.evidence import Judge
@@ -27,7 +27,7 @@ from soilml.log_import.units import factor
 
 _USUAL, _SHARE = 2.0, 0.15  # Shortest window for long runs, s, and its share of short ones
 _MOST_WHEELS = 8  # Wheels that may share a mass, where nothing says how many do
-_MOST_LISTED, _LOOKED = 40, 8  # Most columns that are listed, and runs that are looked at
+_MOST_LISTED = 40  # Most columns that are listed
 #: Words of columns of plate and shear tests.
 _OF_PLATES = {"plate", "pressure", "penetration", "annulus", "shear", "platte", "druck"}
 _PLAUSIBLE = (0.02, 0.7)  # Radii of wheels, m
@@ -86,7 +86,7 @@ class _Guess:
         )
         self.runs = runs_of(logs, replace(found, runs=replace(found.runs, each_row=False)))
         self.run_names = [run.name for run in self.runs]
-        self.run = liveliest(self.runs[:_LOOKED])
+        self.run = self.runs[0]
         clocks = {found.time.column, *(kind.time_column for kind in found.files)}
         columns = candidates_of(self.run.recordings, self.steady)
         self.columns = [c for c in columns if c.name not in clocks]
@@ -213,7 +213,6 @@ class _Guess:
         table.put("shortest", f"{shortest:g} s")
         table.put("settle", f"{min(0.5, shortest / 4.0):g} s", "left out after each change")
         table.put("sensitivity", 1, "2 finds smaller changes, 0.5 only larger ones")
-        table.after = ["# within = [5, 60]  # s after the start: only this part of each run"]
         example = [
             "# [[leave_out]]  # a stretch that somebody disturbed",
             f'# run = "{self.runs[0].name}"',

@@ -12,7 +12,6 @@ from soilml.errors import InputError
 from soilml.io.declared_settings import (
     For,
     Key,
-    Numbers,
     OneOf,
     named_tables,
     take_declared,
@@ -99,9 +98,6 @@ class WindowSettings:
     shortest: Annotated[float, UncertainIn("s", above=0.0, exact=True)] = 2.0
     settle: Annotated[float, _SECONDS] = 0.5
     sensitivity: Annotated[float, Parameter("1", 1e-9, 1e9, "2 finds smaller changes")] = 1.0
-    within: Annotated[
-        tuple[float, float], Numbers("two times in s after the start of a run, such as [5, 20]", 2)
-    ] = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True)
