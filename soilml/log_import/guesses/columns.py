@@ -12,7 +12,6 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.log_import.guesses.role_words import (
     CLEAR,
-    COUNTERS,
     USUAL,
     kinds_of,
     name_scores,
@@ -158,7 +157,11 @@ def _time_score(column: Candidate, score: float, values: Floats) -> float:
     named = score > 0.0 or column.kind == "s"
     steps = np.diff(values[np.isfinite(values)])
     moved = steps[steps != 0.0] if named else steps
-    if moved.size < 8 or np.mean(moved > 0.0) < 0.97 or (not named and says(column.name, COUNTERS)):
+    if (
+        moved.size < 8
+        or np.mean(moved > 0.0) < 0.97
+        or (not named and says(column.name, "counters"))
+    ):
         return 0.0
     if named:
         return score + (2.0 if column.kind == "s" else 0.0) + 1.0

@@ -28,8 +28,6 @@ from soilml.log_import.units import factor
 _USUAL, _SHARE = 2.0, 0.15  # Shortest window for long runs, s, and its share of short ones
 _MOST_WHEELS = 8  # Wheels that may share a mass, where nothing says how many do
 _MOST_LISTED = 40  # Most columns that are listed
-#: Words of columns of plate and shear tests.
-_OF_PLATES = {"plate", "pressure", "penetration", "annulus", "shear", "platte", "druck"}
 _PLAUSIBLE = (0.02, 0.7)  # Radii of wheels, m
 #: Roles that are needed: what may stand for each, and what a map then says.
 _NEEDED = {
@@ -174,7 +172,7 @@ class _Guess:
         lines += [f"#   {line}" for line in describe(listed, self.run.recordings)]
         if len(self.columns) > len(listed):
             lines.append(f"#   and {len(self.columns) - len(listed)} more")
-        of_plates = any(says(c.address, _OF_PLATES) for c in self.columns)
+        of_plates = any(says(c.address, "plates") for c in self.columns)
         if of_plates and not self.found.roles() & {"wheel_speed", "wheel_angle", "slip"}:
             lines.append("# Plate or shear tests, it seems: `soilml bevameter` takes those.")
         notes = dict.fromkeys(note for log in self.logs for r in log for note in r.notes)
