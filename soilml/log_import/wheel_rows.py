@@ -178,9 +178,6 @@ class WheelRows:
                 file = one.source.recordings[0].file.name
                 found += [s.why.under(f"row {s.start + 1:.0f} of {file} is left out: ")
                           for s in one.left_out if s.why]  # fmt: skip
-            elif len(one.dead) > 2 and len(one.dead) >= len(one.inputs.values) - 1:
-                text = f"run {one.source.name}: no sensor{self.of} says anything: an empty log?"
-                found.append(Remark("empty-log", text, (one.source.name,)))
             else:
                 for role, why in one.dead.items():
                     text = f"run {one.source.name}: the sensor of [{role}]{self.of} is dead: {why}"

@@ -87,7 +87,7 @@ def import_log(
             raise InputError(f"{found.source}: no row can be used: {[*remarks, 'empty'][0]}")
         raise FitError(f"{found.source}: no steady window can be used: {_most_frequent(wheels)}")
     remarks = remarks[: _MOST_LEFT if steady else None]
-    remarks += [*_lacks(table, steady), *_several_wheels(table, recordings)]
+    remarks += [*_lacks(table), *_several_wheels(table, recordings)]
     bias = largest_errors([wheel.shared_errors() for wheel in wheels])
     radii = {wheel.wheel.radius.value if wheel.wheel.radius else None for wheel in wheels}
     radius = radii.pop() if len(radii) == 1 else None
@@ -114,29 +114,14 @@ def _most_frequent(wheels: Sequence[WheelRows]) -> str:
     return most.text if most else "the logs are empty"
 
 
-def _lacks(table: Table, steady: bool) -> Iterator[Remark]:
-    """Remarks where no row has a torque, without which there is no estimate on board; and on
-    measured quantities of a table of steady runs that no column gives a standard error of.
-    """
+def _lacks(table: Table) -> Iterator[Remark]:
+    """A remark where no row has a torque, without which there is no estimate on board."""
     if not np.isfinite(table[column("torque")]).any():
         text = (
             "no row has a torque: give the map a [torque] or [motor_current]; estimate needs one, "
             "and identify a torque, a drawbar pull or a sinkage"
         )
         yield Remark("no-torque", text, ("torque",))
-    bare = [
-        name for name in ("torque", "drawbar_pull", "sinkage")
-        if column(name) in table and np.isfinite(table[column(name)]).any()
-        and f"{column(name)}_std" not in table
-    ]  # fmt: skip
-    if steady and bare:
-        lines = ", ".join(f"{column(name)} = '5 %'" for name in bare)
-        text = (
-            f"no standard errors of {', '.join(f'[{name}]' for name in bare)}: name their columns "
-            f"(std = 'COLUMN'), write noise = '5 %' there, or declare them in the model file, as "
-            f"[noise] {lines}: estimates are no better than this number"
-        )
-        yield Remark("no-standard-errors", text, tuple(bare))
 
 
 def _several_wheels(table: Table, logs: Sequence[Sequence[Recording]]) -> list[Remark]:

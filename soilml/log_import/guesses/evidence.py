@@ -40,7 +40,6 @@ _SET = ("load", "slip", "slope")  # Roles that a rig may keep at one value
 _SURELY_PERCENT = 30.0  # As (r omega - v)/v in fractions, a slip of 0.97
 _PAIRS = (("torque", "drawbar_pull"), ("motor_current", "drawbar_pull"), ("torque", "slip"),
           ("sinkage", "slip"), ("sinkage", "torque"), ("motor_current", "torque"))  # fmt: skip
-_OF_NO_MAP = ("odd-row", "constant-reading")  # Hints that doubt rows and sensors
 
 
 @dataclass(frozen=True)
@@ -117,8 +116,7 @@ class Judge:
         rows = Conversion(wheel, None).of(means)
         radius = self._radius(implied) or None
         for hint in hints_of(RowsToCheck(rows, radius, wheel, self.weight)):
-            if hint.code not in _OF_NO_MAP:
-                yield [role for role in hint.about if role in drafts], hint.text
+            yield [role for role in hint.about if role in drafts], hint.text
 
     def _radius(self, implied: float) -> float:
         """The radius as stated, else the largest travel over rotation; 0 where no wheel has it."""

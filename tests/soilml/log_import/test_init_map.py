@@ -194,7 +194,7 @@ def test_the_traps_of_real_logs(rig_logs, tmp_path, capsys):
     assert np.isnan(by_run["test_2"]["torque_Nm"]).all()
     end = 3.0 + 3 * 9.0 - 5.0
     assert np.all(by_run["test_3"]["time_s"] < end)
-    assert "as if someone had touched it" in (tmp_path / "runs.report.html").read_text()
+    assert "nothing stays the same for" in (tmp_path / "runs.report.html").read_text()
     assert (tmp_path / "runs.bias.toml").read_text().count("[bias]") >= 1
 
 

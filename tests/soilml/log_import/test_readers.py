@@ -92,7 +92,7 @@ def test_a_log_without_header_numbers_its_columns(tmp_path):
         ("a.parquet", b"PAR1", "is not a complete Parquet file"),
         ("a.mcap", b"not mcap", "cannot be read as a bag"),
         ("a.bag", b"not a bag", "cannot be read as a bag"),
-        ("a.db3", b"not a bag", "needed is a metadata.yaml beside it"),
+        ("a.db3", b"not a bag", "give its folder"),
     ],
 )
 def test_what_cannot_be_read_is_said_in_one_line(tmp_path, name, content, words):
