@@ -9,14 +9,14 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.io.declared_settings import Default, Numbers, OneOf, settings_of, take_declared
+from soilml.io.declared_settings import Numbers, OneOf, settings_of, take_declared
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
 from soilml.numerics.smooth_process import SmoothFunctions, process_columns, squared_exponential
@@ -93,7 +93,7 @@ class RemainderPart:
     """
 
     column: Annotated[str, _CHANNEL]
-    gear: Annotated[str, Default("")]  # "" where the model has one gear
+    gear: str = field(default="", kw_only=True)  # "" where the model has one gear
     # Standard deviation a of the process, in the column's unit, and that of a model's usual error
     amplitude: Annotated[float, _SIZE]
     usual: Annotated[float, _SIZE]
@@ -253,7 +253,7 @@ class Remainder:
         --------
         >>> import numpy as np
         >>> part = RemainderPart(
-        ...     "torque_Nm", "", 0.2, 0.1, 0.3, 0.6, (0.2, 0.2), (60.0, 60.0),
+        ...     "torque_Nm", 0.2, 0.1, 0.3, 0.6, (0.2, 0.2), (60.0, 60.0),
         ...     ((0.2, 60.0),), (1.5,), ((0.8,),), ((0.0,),))
         >>> mean, std = Remainder((part,)).mean_and_std("torque", [0.2, 0.5, 5.0], 60.0)
         >>> print(mean.round(3), std.round(3))

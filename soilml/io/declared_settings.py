@@ -96,13 +96,6 @@ class For:
 
 
 @dataclass(frozen=True)
-class Default:
-    """The value of a field that has none of its own, where the key is absent."""
-
-    value: Any
-
-
-@dataclass(frozen=True)
 class OneOf:
     """A text that is one of some."""
 
@@ -201,10 +194,7 @@ def take_declared(cls: type[T], settings: Settings, kind: str = "", **given: Any
         wanted = [mark.kinds for mark in marks if isinstance(mark, For)]
         if name in given or any(kind not in kinds for kinds in wanted):
             continue
-        default = next((mark for mark in marks if isinstance(mark, Default)), None)
-        if default is not None and key not in settings:
-            values[name] = default.value
-        elif key in settings or needed:
+        if key in settings or needed:
             values[name] = _taken(settings, key, hint, marks, kind)
         settings.permit([key])
     settings.finish()

@@ -96,8 +96,7 @@ def read_table(
         A Parquet file where the name ends in `.parquet`, a spreadsheet (.xlsx, or BOOK.xlsx#SHEET
         where it has several sheets), otherwise a CSV file with a header and comma as separator.
         Column names carry their units, such as load_N and torque_Nm. Data frames of pandas, polars
-        and pyarrow, and whatever else exports an Arrow stream, are read with the same checks;
-        `Table.to_arrow` gives one back.
+        and pyarrow, and whatever else exports an Arrow stream, are read with the same checks.
     need
         Columns that must be present.
     filled

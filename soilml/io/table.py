@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from soilml.errors import TableError
 from soilml.io.bounds import MOST_TEXT
 from soilml.io.cell_text import is_plain, read_number
-from soilml.optional_imports import need
 from soilml.results import data_frame
 from soilml.row_status import Status
 
@@ -152,17 +151,6 @@ class Table:
     def to_frame(self) -> Any:
         """The columns as a data frame of pandas; `MissingLibraryError` without it."""
         return data_frame(self.columns)
-
-    def to_arrow(self) -> Any:
-        """The columns as a pyarrow table, which pandas, polars and others take.
-
-        >>> Table({"slip": np.array([0.1, 0.3])}).to_arrow().column_names
-        ['slip']
-        """
-        need("pyarrow", "", what="an Arrow table")
-        import pyarrow as pa
-
-        return pa.table(self.columns)
 
     def place(self, row: int) -> str:
         """File and line of a row, for a message."""

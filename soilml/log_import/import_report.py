@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 #: Most runs of which the page has a picture; the others are in the tables.
 MOST_RUNS = 24
 _SHOWN = ("run", "time_s", "slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m")
-_UNITS = {"slip": "1", "load": "N", "torque": "N m", "drawbar_pull": "N", "sinkage": "m"}
 #: Panels of a run: title with unit, quantities, and labels.
 _PANELS = (
     ("speed, m/s", ("rim_speed", "speed"), ("rim", "travel")),
@@ -102,24 +101,6 @@ def _tables(found: ImportedLog) -> Iterator[ReportTable]:
                 Column("why", [str(why) for (_, why), _ in entries]),
             ],
         )
-    if found.shared:
-        shared = sorted(found.shared, key=lambda p: (p.quantity, -p.rms))
-        yield ReportTable(
-            "Errors that all rows share",
-            [
-                Column("uncertain", [_constant(part.constant) for part in shared]),
-                Column("changes the", [part.quantity.replace("_", " ") for part in shared]),
-                Column(
-                    "rms", [p.rms for p in shared], [_UNITS[p.quantity] for p in shared], digits=2
-                ),
-            ],
-            "From the uncertainties of the map. Averaging more rows does not lessen them.",
-        )
-
-
-def _constant(name: str) -> str:
-    owner, _, own = name.replace("_", " ").rpartition(".")
-    return f"{own} of [{owner.replace(' ', '_')}]" if owner else own
 
 
 def _pictures(found: ImportedLog) -> Iterator[Picture]:

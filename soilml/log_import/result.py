@@ -9,7 +9,6 @@ import numpy as np
 
 from soilml.config.measurement_noise import Noise
 from soilml.io.table import Table
-from soilml.log_import.channels.wheel_quantities import SharedError
 from soilml.log_import.wheel_rows import WheelSeries
 from soilml.log_import.windows.steady import Stretch
 from soilml.remarks import Remark
@@ -29,8 +28,6 @@ class ImportedLog(Result):
         One row for each steady window of each wheel.
     bias
         Errors that all rows share, by column, as `[bias]` of a model file states them.
-    shared
-        What each uncertain constant of the map adds to them.
     series
         Each wheel in each run.
     remarks
@@ -43,7 +40,6 @@ class ImportedLog(Result):
 
     table: Table
     bias: dict[str, Noise]
-    shared: tuple[SharedError, ...]
     series: tuple[WheelSeries, ...]
     remarks: tuple[Remark, ...] = ()
     implausible: tuple[Remark, ...] = ()

@@ -14,7 +14,7 @@ from soilml.errors import InputError
 from soilml.io.table import TEXT, Table
 from soilml.log_import.channels.inputs import Inputs, channel_constant, combined, our_slip
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.channels.wheel_quantities import Conversion, gear_of
+from soilml.log_import.channels.wheel_quantities import Conversion
 from soilml.log_import.mapping.channel_map import ROTATIONS, TRAVELS, ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.windows.mean_errors import mean_error, pooled_errors, travel_ratio
@@ -275,7 +275,7 @@ def rows_as_table(
     for wheel, run, rows in groups:
         named = {"run": f"{run.name}_{wheel.name}" if wheel.name else run.name}
         named |= {"wheel": wheel.name} if wheel.name else {}
-        named |= {"gear": gear} if (gear := gear_of(wheel, run)) else {}
+        named |= {"gear": wheel.gear} if wheel.gear else {}
         for row in rows:
             line: dict[str, Any] = dict(named)
             for name in (*_UNCERTAIN, "vibration"):

@@ -1,11 +1,11 @@
-"""Tables of plate, shear and triaxial tests under other names and in other units."""
+"""Tables of plate and shear tests under other names and in other units."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from unicodedata import combining, normalize
 
@@ -65,17 +65,16 @@ class SoilTests:
 
 
 def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
-    """Plate, shear or triaxial tests whose columns have other names and state their units.
+    """Plate or shear tests whose columns have other names and state their units.
 
     A second column of a quantity that is taken is left out. Without a column that names the test, a
     new one begins where the displacement starts again, or the stress or the plate is another one.
-    A triaxial test gives the point at which its circle of failure touches the common line.
 
     None where the columns are those of soilml, where none is of tests, and where the file cannot
     be read.
 
-    Raises `InputError` where a column that seems to be of tests states no unit, and for vane tests,
-    which have no normal stress.
+    Raises `InputError` where a column that seems to be of tests states no unit, and for vane and
+    triaxial tests.
     """
     try:
         recordings = read_log(Path(path))
@@ -86,13 +85,11 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
         return None
     if any(n not in TEXT and n.removesuffix("_std") in COLUMNS for n in own.columns):
         return None
-    if any(_says(n, "vane") for n in own.columns):
+    if kind := next((kind for kind in map(partial(_other_kind, own), own.columns) if kind), ""):
         raise InputError(
-            f"{name}: vane tests are not read: they give the undrained strength alone; needed are "
-            "plate, shear or triaxial tests"
+            f"{name}: {kind} tests are not read; needed are plate or shear tests: of triaxial "
+            "tests, give cohesion and friction_angle in [soil]"
         )
-    if circles := _circles(name, own):
-        return circles
     sheared = any(_says(n, "shear", "across") for n in own.columns)
     found, taken, left_out = _taken(name, own, sheared)
     _complete(name, own, found, taken)
@@ -150,7 +147,7 @@ def _complete(path: str, own: Recording, found: dict[str, Floats], taken: list[s
     if "pressure_Pa" in found and "plate_width_m" in found:
         found.setdefault("plate_length_m", found["plate_width_m"])  # a pressure needs no area
     if "sinkage_m" in found and not {*_PLATES} & found.keys():
-        if radius := stated_radius(agreed_constants([[own]]).common):
+        if radius := stated_radius(agreed_constants([[own]])):
             found["plate_radius_m"] = np.full(len(own), radius)
             taken.append(f"plate_radius_m = {radius:g} m, as the file or its name states")
         elif "load_N" in found and any(_says(name, "plates") for name in own.columns):
@@ -167,6 +164,15 @@ def _complete(path: str, own: Recording, found: dict[str, Floats], taken: list[s
         for force, stress in (("shear_force", "shear_stress_Pa"), ("load_N", "normal_stress_Pa")):
             if force in found:
                 found[stress] = found.pop(force) / area
+
+
+def _other_kind(own: Recording, name: str) -> str:
+    """The kind of test that a column is of, where it is none that is read; "" else."""
+    if _says(name, "vane"):
+        return "vane"
+    words = words_of(name)
+    of_cell = _says(name, "deviator", "confining") or ({"sigma", "σ"} & {*words} and "3" in words)
+    return "triaxial" if of_cell and dimension(_unit(own, name)) == "Pa" else ""
 
 
 def _unit(own: Recording, name: str) -> str:
@@ -249,55 +255,3 @@ def _starts(found: dict[str, Floats], count: int) -> np.ndarray:
             jumps = np.abs(np.diff(own)) > _OTHER * np.abs(own[:-1])
             starts[1:] |= jumps & (np.mean(jumps) < _SELDOM)
     return starts
-
-
-def _circles(path: str, own: Recording) -> SoilTests | None:
-    """Triaxial tests as points of failure; None where the columns are of no triaxial test."""
-    columns = dict(_triaxial(own))
-    if "cell" not in columns or not {"deviator", "axial"} & columns.keys():
-        return None
-
-    def read(key: str) -> Floats:
-        name = columns[key]
-        return own.columns[name] * factor(_unit(own, name), "Pa", f"{path}, column {name!r}")
-
-    cell, pore = read("cell"), read("pore") if "pore" in columns else 0.0
-    deviator = read("deviator") if "deviator" in columns else read("axial") - cell
-    label, names = _names(own, {"sinkage_m": cell} if len(own) > np.unique(cell).size else {})
-    if not label:
-        names = [f"{round(pressure / 100.0) / 10:g} kPa" for pressure in cell]
-    tests = list(dict.fromkeys(names))
-    peaks = [max((i for i, n in enumerate(names) if n == test), key=lambda i: deviator[i])
-             for test in tests]  # fmt: skip
-    radius = deviator[peaks] / 2.0
-    centre = (cell - pore)[peaks] + radius
-    if len(tests) < 2 or float(np.ptp(centre)) < _OTHER * float(np.max(centre)):
-        raise InputError(f"{path}: needed are triaxial tests at two or more cell pressures")
-    # eq. of the tangent: (s1 - s3)/2 = c cos(phi) + (s1 + s3)/2 sin(phi)
-    sine = float(np.clip(np.polyfit(centre, radius, 1)[0], 0.0, 0.99))
-    points = {
-        "test": text_column(tests, lambda i: f"{path}, test {i + 1}"),
-        "normal_stress_Pa": centre - radius * sine,
-        "shear_stress_Pa": radius * np.sqrt(1.0 - sine**2),
-    }
-    said = ", ".join(f"{key} = {name!r}" for key, name in columns.items())
-    taken = (f"{len(tests)} triaxial tests, of which the circles of failure count", said)
-    left = tuple(repr(n) for n in own.columns if n not in columns.values() and n != label)
-    return SoilTests(Table(points, path, np.arange(1, len(tests) + 1)), taken, left)
-
-
-def _triaxial(own: Recording) -> Iterator[tuple[str, str]]:
-    """The columns of a triaxial test: cell, deviator or axial stress, and pore pressure."""
-    for name in reversed([*own.columns]):
-        if dimension(_unit(own, name)) != "Pa":
-            continue
-        words = {*words_of(name)}
-        sigma = bool(words & {"sigma", "σ", "s"})
-        if _says(name, "pore"):
-            yield "pore", name
-        elif _says(name, "deviator") or (sigma and {"1", "3"} <= words):
-            yield "deviator", name
-        elif _says(name, "confining") or (sigma and "3" in words):
-            yield "cell", name
-        elif sigma and "1" in words:
-            yield "axial", name

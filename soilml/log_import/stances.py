@@ -15,7 +15,7 @@ from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.log_import.channels.inputs import SMOOTH, Inputs
 from soilml.log_import.channels.resampling import derivative
-from soilml.log_import.mapping.log_map import LeaveOut, WheelMap, WindowSettings
+from soilml.log_import.mapping.log_map import LeaveOut, WheelMap
 from soilml.log_import.windows.steady import Stretch, searched_parts
 from soilml.remarks import Remark
 
@@ -82,7 +82,6 @@ def stances(
     inputs: Inputs,
     angle: Floats,
     wheel: WheelMap,
-    windows: WindowSettings,
     left_out: tuple[LeaveOut, ...],
 ) -> Iterator[tuple[Stretch, Stretch]]:
     """Each stance of a run, and its part around midstance, where sensors are averaged.
@@ -103,7 +102,7 @@ def stances(
             missing = float(np.mean(~np.isfinite(angle[inside])))
             ends = Stretch(float(own[0]), float(own[-1]))
             found.append((ends, Stretch(float(middle[0]), float(middle[-1])), missing))
-    left = searched_parts(time, windows, left_out)[1]
+    left = searched_parts(time, left_out)[1]
     usual = float(np.median([s.stop - s.start for s, _, _ in found])) if found else 0.0
     for whole, middle, missing in found:
         lasts, why = whole.stop - whole.start, None

@@ -11,7 +11,7 @@ from soilml.arrays import Floats
 from soilml.config.measurement_noise import Noise
 from soilml.log_import.channels.inputs import Inputs, wheel_inputs
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.channels.wheel_quantities import Conversion, SharedError
+from soilml.log_import.channels.wheel_quantities import Conversion
 from soilml.log_import.checks.columns import unit_remarks, with_shared_errors
 from soilml.log_import.checks.row_checks import hints_of
 from soilml.log_import.checks.sensors import dead_sensors, drop_clipped, untared_sensors
@@ -135,7 +135,7 @@ class WheelRows:
         left_out = tuple(e for e in self.log_map.left_out if e.run in ("", name))
         parts: Iterator[tuple[Stretch, Stretch | None]]
         if angle is not None:
-            parts = stances(inputs, angle, self.wheel, settings, left_out)
+            parts = stances(inputs, angle, self.wheel, left_out)
         else:
             found = steady_windows(inputs.time, one.quantities, settings, left_out, inputs.motion)
             parts = ((stretch, None) for stretch in found)
@@ -178,9 +178,6 @@ class WheelRows:
                 file = one.source.recordings[0].file.name
                 found += [s.why.under(f"row {s.start + 1:.0f} of {file} is left out: ")
                           for s in one.left_out if s.why]  # fmt: skip
-            elif len(one.dead) > 2 and len(one.dead) >= len(one.inputs.values) - 1:
-                text = f"run {one.source.name}: no sensor{self.of} says anything: an empty log?"
-                found.append(Remark("empty-log", text, (one.source.name,)))
             else:
                 for role, why in one.dead.items():
                     text = f"run {one.source.name}: the sensor of [{role}]{self.of} is dead: {why}"
@@ -191,7 +188,7 @@ class WheelRows:
         units = unit_remarks(self.wheel, self.runs[0].source)
         return found + [remark for remark in units if remark.code == "unit-differs"]
 
-    def shared_errors(self) -> tuple[dict[str, Noise], list[SharedError]]:
+    def shared_errors(self) -> dict[str, Noise]:
         """The errors that the rows share by the constants of the map."""
         means = by_name([row.means for one in self.runs for row in one.kept])
-        return self.conversion.shared_errors(means) if means else ({}, [])
+        return self.conversion.shared_errors(means) if means else {}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import numpy as np
 from soilml.errors import FitError, InputError
 from soilml.io.table import Table
 from soilml.log_import.channels.runs import runs_of, runs_of_rows
-from soilml.log_import.channels.wheel_quantities import largest_errors, wheels_by_gear
+from soilml.log_import.channels.wheel_quantities import largest_errors
 from soilml.log_import.guesses.role_words import is_size
 from soilml.log_import.mapping.log_map import LogMap, map_from, read_map
 from soilml.log_import.readers import Progress, read_logs, silent
@@ -75,11 +74,8 @@ def import_log(
         found = map_from(log_map) if isinstance(log_map, Mapping) else read_map(log_map)
     recordings, steady = read_logs(files, said), found.runs.each_row
     runs = runs_of_rows(recordings, found) if steady else runs_of(recordings, found)
-    parts = [part for w in found.wheels for part in wheels_by_gear(found, w, runs)]
-    wheels = [WheelRows(found, wheel, [runs[i] for i in own], said) for wheel, own in parts]
-    # by run: its wheels, each in the analysis that has its gear
-    each = [zip(own, w.runs, strict=True) for w, (_, own) in zip(wheels, parts, strict=True)]
-    by_run = [one for _, one in sorted(chain(*each), key=lambda e: e[0])]
+    wheels = [WheelRows(found, wheel, runs, said) for wheel in found.wheels]
+    by_run = [one for of_run in zip(*(w.runs for w in wheels), strict=True) for one in of_run]
     wrong = [hint for wheel in wheels for hint in wheel.hints()]
     if wrong and not accept:
         raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
@@ -91,8 +87,8 @@ def import_log(
             raise InputError(f"{found.source}: no row can be used: {[*remarks, 'empty'][0]}")
         raise FitError(f"{found.source}: no steady window can be used: {_most_frequent(wheels)}")
     remarks = remarks[: _MOST_LEFT if steady else None]
-    remarks += [*_lacks(table, steady), *_several_wheels(table, recordings)]
-    bias, shared = largest_errors([wheel.shared_errors() for wheel in wheels])
+    remarks += [*_lacks(table), *_several_wheels(table, recordings)]
+    bias = largest_errors([wheel.shared_errors() for wheel in wheels])
     radii = {wheel.wheel.radius.value if wheel.wheel.radius else None for wheel in wheels}
     radius = radii.pop() if len(radii) == 1 else None
     for one in by_run:
@@ -100,7 +96,6 @@ def import_log(
     return ImportedLog(
         table=table,
         bias=bias,
-        shared=tuple(shared),
         series=() if steady else tuple(by_run),
         remarks=tuple(dict.fromkeys(remarks)),
         implausible=tuple(wrong),
@@ -119,29 +114,14 @@ def _most_frequent(wheels: Sequence[WheelRows]) -> str:
     return most.text if most else "the logs are empty"
 
 
-def _lacks(table: Table, steady: bool) -> Iterator[Remark]:
-    """Remarks where no row has a torque, without which there is no estimate on board; and on
-    measured quantities of a table of steady runs that no column gives a standard error of.
-    """
+def _lacks(table: Table) -> Iterator[Remark]:
+    """A remark where no row has a torque, without which there is no estimate on board."""
     if not np.isfinite(table[column("torque")]).any():
         text = (
             "no row has a torque: give the map a [torque] or [motor_current]; estimate needs one, "
             "and identify a torque, a drawbar pull or a sinkage"
         )
         yield Remark("no-torque", text, ("torque",))
-    bare = [
-        name for name in ("torque", "drawbar_pull", "sinkage")
-        if column(name) in table and np.isfinite(table[column(name)]).any()
-        and f"{column(name)}_std" not in table
-    ]  # fmt: skip
-    if steady and bare:
-        lines = ", ".join(f"{column(name)} = '5 %'" for name in bare)
-        text = (
-            f"no standard errors of {', '.join(f'[{name}]' for name in bare)}: name their columns "
-            f"(std = 'COLUMN'), write noise = '5 %' there, or declare them in the model file, as "
-            f"[noise] {lines}: estimates are no better than this number"
-        )
-        yield Remark("no-standard-errors", text, tuple(bare))
 
 
 def _several_wheels(table: Table, logs: Sequence[Sequence[Recording]]) -> list[Remark]:
@@ -156,8 +136,8 @@ def _several_wheels(table: Table, logs: Sequence[Sequence[Recording]]) -> list[R
         if 1 < len(found) <= _MOST_SIZES and not named:
             text = (
                 f"the column {name!r} says {', '.join(f'{size:g}' for size in sorted(found)[:4])}: "
-                "rows of several wheels. Give each a gear ([wheel] gear_from, [gears.NAME]), or a "
-                "table of its own; one model of one wheel is no model of them all"
+                "rows of several wheels. Give each a table and a map of its own, with its radius "
+                "and [wheel] gear = 'NAME'; one model of one wheel is no model of them all"
             )
             return [Remark("several-wheels", text, ("wheel_radius",))]
     return []

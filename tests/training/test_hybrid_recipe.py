@@ -25,7 +25,7 @@ def recipe(tmp_path):
     (tmp_path / "recipe.toml").write_text(text)
     plain = read_recipe(tmp_path / "recipe.toml")
     part = RemainderPart(
-        "torque_Nm", "", 0.2, 0.2, 0.3, 0.6, (0.1, 0.5), (40.0, 110.0),
+        "torque_Nm", 0.2, 0.2, 0.3, 0.6, (0.1, 0.5), (40.0, 110.0),
         ((0.3, 70.0),), (2.0,), ((0.2,),), ((0.1,),),
     )  # fmt: skip
     return replace(plain, case=replace(plain.case, remainder=Remainder((part,))))

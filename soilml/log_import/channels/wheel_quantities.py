@@ -1,11 +1,11 @@
-"""Slip, torque, load and the other quantities of a wheel from its channels, the map and its gears;
+"""Slip, torque, load and the other quantities of a wheel from its channels and the map;
 errors that all rows share, from the uncertain constants of the map.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -13,23 +13,12 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.measurement_noise import KNOWN_PARTS, Noise
-from soilml.errors import InputError, did_you_mean
-from soilml.log_import.channels.runs import Run
 from soilml.log_import.mapping.channel_map import GEARED, Uncertain
-from soilml.log_import.mapping.log_map import LogMap, Vehicle, WheelMap
+from soilml.log_import.mapping.log_map import Vehicle, WheelMap
 from soilml.quantities import COLUMNS, column
 
 #: Names of the offset and of the share that [bias] of a model file can state of a quantity.
 _FORMS = {COLUMNS[key].name: parts for key, parts in KNOWN_PARTS.items()}
-
-
-@dataclass(frozen=True)
-class SharedError:
-    """The effect of one uncertain constant on one quantity of the rows: its rms change."""
-
-    constant: str
-    quantity: str
-    rms: float
 
 
 @dataclass(frozen=True)
@@ -126,10 +115,8 @@ class Conversion:
         found |= {role: read(role) for role in ("vibration", "slope") if role in channels}
         return {name: np.asarray(values, dtype=np.float64) for name, values in found.items()}
 
-    def shared_errors(
-        self, means: Mapping[str, Floats]
-    ) -> tuple[dict[str, Noise], list[SharedError]]:
-        """The errors that rows share, by column, and what each constant adds to them.
+    def shared_errors(self, means: Mapping[str, Floats]) -> dict[str, Noise]:
+        """The errors that rows share, by column.
 
         means: Channels of the rows (rows,).
         Each constant is changed by one standard deviation. The change of a quantity counts as
@@ -138,7 +125,6 @@ class Conversion:
         """
         usual = self.of(means)
         bias: dict[str, Noise] = {}
-        parts = []
         for name, constant in self.constants.items():
             if constant.std == 0.0:
                 continue
@@ -153,7 +139,6 @@ class Conversion:
                 if not np.any(change):
                     continue
                 rms, size = (float(np.sqrt(np.mean(x**2))) for x in (change, reading))
-                parts.append(SharedError(name, key, rms))
                 has_offset, has_share = _FORMS[key]
                 gain = float(change @ reading) / (len(reading) * size**2) if size else 0.0
                 by_share, by_offset = (
@@ -166,22 +151,20 @@ class Conversion:
                 one = Noise(share=rms / size) if as_share else Noise(constant=rms)
                 bias[column(key)] = _joined(bias.get(column(key), Noise()), one, np.hypot)
         order = [column(key) for key in _FORMS if column(key) in bias]
-        return {key: bias[key] for key in order}, parts
+        return {key: bias[key] for key in order}
 
 
 def _joined(one: Noise, other: Noise, how: Any) -> Noise:
     return Noise(float(how(one.constant, other.constant)), float(how(one.share, other.share)))
 
 
-def largest_errors(
-    found: Sequence[tuple[Mapping[str, Noise], Sequence[SharedError]]],
-) -> tuple[dict[str, Noise], list[SharedError]]:
+def largest_errors(found: Sequence[Mapping[str, Noise]]) -> dict[str, Noise]:
     """Shared errors of several wheels as one table [bias], which their rows share: the largest."""
     bias: dict[str, Noise] = {}
-    for own, _ in found:
+    for own in found:
         for key, noise in own.items():
             bias[key] = _joined(bias.get(key, noise), noise, max)
-    return bias, [part for _, parts in found for part in parts]
+    return bias
 
 
 def slip_ratio(rim: Any, ground: Any) -> Any:
@@ -241,51 +224,3 @@ def slope_of(columns: Sequence[Floats]) -> Floats:
     with np.errstate(invalid="ignore", divide="ignore"):
         rise = 2.0 * (x * z - w * y) / (x**2 + y**2 + z**2 + w**2)
     return np.arcsin(np.clip(rise, -1.0, 1.0))
-
-
-def gear_of(wheel: WheelMap, run: Run) -> str:
-    """The gear of a wheel in a run; "" where the map states none.
-
-    Raises `InputError` where neither the name of the run nor that of its file has it.
-    """
-    if wheel.gear_pattern is None:
-        return wheel.gear
-    for text in (run.name, run.recordings[0].file.name):
-        if match := wheel.gear_pattern.search(text):
-            return match[match.re.groups]
-    raise InputError(
-        f"[wheel] gear_from {wheel.gear_pattern.pattern!r} finds nothing in the name of the run "
-        f"{run.name!r}, nor in {run.recordings[0].file.name!r}"
-    )
-
-
-def wheels_by_gear(
-    log_map: LogMap, wheel: WheelMap, runs: Sequence[Run]
-) -> list[tuple[WheelMap, list[int]]]:
-    """The wheel with each gear that it had, with the gear's radius, and the indices of its runs.
-
-    One wheel with all runs where the map has no [gears]. Names of gears are compared whatever the
-    case of their letters.
-
-    Raises `InputError` where a run has a gear that [gears] lacks, and no other radius is given; and
-    as `gear_of` does.
-    """
-    if not log_map.gears or wheel.gear_pattern is None:
-        return [(wheel, list(range(len(runs))))]
-    names = {name.casefold(): name for name in log_map.gears}
-    found: dict[str, list[int]] = {}
-    for i, run in enumerate(runs):
-        gear = gear_of(wheel, run)
-        known = names.get(gear.casefold())
-        if known is None and wheel.radius is None:
-            raise InputError(
-                f"{log_map.source}: run {run.name!r} has the gear {gear!r}, and [gears] does not; "
-                f"{did_you_mean(gear, names.values())}there are {', '.join(log_map.gears)}; add "
-                f"[gears.{gear}] with its radius, or correct gear_from"
-            )
-        found.setdefault(known or gear, []).append(i)
-    return [
-        (replace(wheel, gear=gear, gear_pattern=None,
-                 radius=log_map.gears.get(gear, wheel.radius)), own)
-        for gear, own in found.items()
-    ]  # fmt: skip

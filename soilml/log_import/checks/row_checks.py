@@ -77,15 +77,11 @@ def _check_torque(rows: RowsToCheck) -> Iterator[Hint]:
     lever = np.abs(rows.effort()[judged])
     if lever.size and rows.radius is not None:
         traction = lever / np.broadcast_to(rows.radius, torque.shape)[judged]
-        middle, largest = float(np.median(traction)), float(np.max(traction))
+        middle = float(np.median(traction))
         if not TRACTION[0] <= middle <= TRACTION[1]:
             shown = f"torque is {middle:.3g} times W r {_IN_THE_MIDDLE}"
             text = f"{shown}: probably {_cause_of_traction(rows, role, middle)}"
             yield Hint("traction-out-of-range", text, (role, "load"))
-        elif rows.wheel is None and largest > 2 * TRACTION[1]:
-            row = int(np.flatnonzero(judged)[np.argmax(traction)]) + 1
-            shown = f"torque is {largest:.3g} times W r in row {row}"
-            yield Hint("odd-row", f"{shown}: look at that row", (role,), wrong=False)
     elif rows.wheel is not None and lever.size and np.median(lever) > _MOST_LEVER:
         text = (
             f"torque over load is {float(np.median(lever)):.3g} m {_IN_THE_MIDDLE}, more than the "
@@ -98,10 +94,6 @@ def _check_torque(rows: RowsToCheck) -> Iterator[Hint]:
         shown = f"torque is below zero in {int(np.sum(turned < 0.0))} of {turned.size}"
         write = rows.write("reverse = true", role)
         yield Hint("sign", f"{shown} driving rows: {_TURNED}{write}", (role,))
-    known = np.isfinite(torque) & np.isfinite(slip)
-    if known.sum() >= 4 and np.ptp(slip[known]) > 0.05 and np.ptp(torque[known]) == 0.0:
-        text = f"torque is {float(torque[known][0]):g} N m at every slip: probably its sensor "
-        yield Hint("constant-reading", f"{text}is dead", (role,), wrong=False)
 
 
 def _cause_of_traction(rows: RowsToCheck, role: str, traction: float) -> str:

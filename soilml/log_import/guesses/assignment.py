@@ -1,8 +1,7 @@
 """Which column is taken for which role, for one wheel or for several.
 
 Axes of a force sensor lie as somebody has mounted it, so that x, y and z say little. On a wheel
-that drives, the largest steady force is the load. The torque and the pull vary together, beside
-what either has of the load.
+that drives, the largest steady force is the load. The torque and the pull vary together.
 """
 
 from __future__ import annotations
@@ -18,7 +17,14 @@ from soilml.arrays import Floats
 from soilml.log_import.channels.resampling import on_grid
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import Candidate
-from soilml.log_import.guesses.role_words import USUAL, WHEEL_WORDS, says, wheel_word, words_of
+from soilml.log_import.guesses.role_words import (
+    USUAL,
+    WHEEL_WORDS,
+    group,
+    says,
+    wheel_word,
+    words_of,
+)
 from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import factor
 
@@ -32,9 +38,7 @@ _TURNING, _TRAVEL = {*_RIVALS[0]}, {*_RIVALS[1]}
 _PLACES = ("wheel_angle", "position")  # Whose rate is a speed
 _MEASURED = 3.0  # What a measured torque is worth over a current, whose constants no log shows
 _LEAST = 2.0  # Lowest score of a guess
-#: Words of a place in the world; least range of a part of the way, over that of another one.
-_OF_A_ROVER = {"odom", "odometry", "vo", "pose", "gps", "marker", "tracking"}
-_OF_TRAVEL = 0.3
+_OF_TRAVEL = 0.3  # Least range of a part of the way, over that of another one
 _AXLES = {"f": "front", "r": "rear", "b": "rear", "m": "middle", "c": "middle"}
 #: Two letters in either order: fl, lf -> front, left.
 _SIDES = {
@@ -46,10 +50,6 @@ _SIDES = {
 #: Axle by the word in the name of a wheel.
 _AXLE_OF = {"back": "rear", "mid": "middle", "centre": "middle", "center": "middle"}
 _AXLE_OF |= {name: name for name in _AXLES.values()}
-_FORCES = {*words_of("f fx fy fz force forces kraft fuerza forza 力")}
-_MOMENTS = {*words_of("m mx my mz t tx ty tz moment torque drehmoment tau momento couple coppia")}
-#: Words of cells that carry a wheel together, whose forces are added; before the number of a wheel.
-_NOT_ALIKE = {*words_of("lc cell zelle celda cella corner wheel rad motor joint axle leg")}
 _BLOCKS, _FEWEST = 240, 12  # Means of which the behaviour is judged: most and fewest
 _DRIVES = 0.3  # Share of the usual speed from which a wheel drives
 #: How much larger the load is than another force; its scatter over its size; correlation of pull
@@ -134,7 +134,7 @@ def _axes_of(column: Candidate, candidates: Sequence[Candidate]) -> list[Candida
     part of the place: it may be the sinkage of a gantry. Where a rover drives straight, y may be
     constant.
     """
-    rover, known = says(column.address, _OF_A_ROVER), {c.address: c for c in candidates}
+    rover, known = says(column.address, "rover"), {c.address: c for c in candidates}
     for match in reversed(list(re.finditer("[xX]", column.address))):
         before, after = column.address[: match.start()], column.address[match.end() :]
         y, z = (known.get(before + axis + after) for axis in ("yz" if match[0] == "x" else "YZ"))
@@ -183,7 +183,7 @@ def _take_wheels(found: Assignment) -> None:
 
 def _frame(candidate: Candidate) -> tuple[str, ...]:
     """The words of a name without those of the wheel."""
-    return tuple(word for word in words_of(candidate.address) if word not in WHEEL_WORDS)
+    return tuple(word for word in words_of(candidate.address) if word not in group(*WHEEL_WORDS))
 
 
 def _wheel_name(address: str) -> str:
@@ -263,12 +263,11 @@ def _largest_family(candidates: Iterable[Candidate]) -> list[Candidate]:
 
 
 def _is_alike(candidate: Candidate, moments: bool) -> bool:
-    words = {*words_of(candidate.name)}
-    if words & _NOT_ALIKE or candidate.constant:
+    if says(candidate.name, "cells") or candidate.constant:
         return False
     if candidate.kind is not None:
         return candidate.kind in (("N m",) if moments else ("N", "kg"))
-    return bool(words & (_MOMENTS if moments else _FORCES))
+    return says(candidate.name, "moments" if moments else "forces")
 
 
 def _block_means(
@@ -328,19 +327,14 @@ def _pair(
     driving: NDArray[np.bool_],
     load: str,
 ) -> tuple[str, str, float]:
-    """Pull and torque: the force and the moment that vary most together, and their correlation.
-
-    What varies with the load is taken off first: lateral forces and the moments that they make.
-    """
-    weight = means[load] if load else np.zeros(driving.size)
-    size = abs(float(np.median(weight[driving])))
-    left = {address: _beside(means[address], weight) for address in (*pulls, *turning)}
-    spread = {address: float(np.std(own)) for address, own in left.items()}
+    """Pull and torque: the force and the moment that vary most together, and their correlation."""
+    size = abs(float(np.median(means[load][driving]))) if load else 0.0
+    spread = {address: float(np.std(means[address])) for address in (*pulls, *turning)}
     lively = [a for a in pulls if spread[a] > _VARIES * size]
     best, most, correlation = ("", ""), 0.0, 0.0
     for f in lively:
         for m in (t for t in turning if spread[t] > 0.0):
-            common = abs(float(np.corrcoef(left[f], left[m])[0, 1]))
+            common = abs(float(np.corrcoef(means[f], means[m])[0, 1]))
             if common * spread[f] * spread[m] > most:
                 best, most, correlation = (f, m), common * spread[f] * spread[m], common
     if correlation >= _TOGETHER_FROM:
@@ -350,12 +344,3 @@ def _pair(
         max(turning, key=lambda a: spread[a], default=""),
         0.0,
     )
-
-
-def _beside(own: Floats, weight: Floats) -> Floats:
-    """What of a column (n,) does not follow from the load (n,)."""
-    rest = np.asarray(own - own.mean())
-    if float(np.std(weight)) <= 0.05 * abs(float(weight.mean())):
-        return rest  # nothing of note: the load did not change
-    share = weight - weight.mean()
-    return np.asarray(rest - share * float(share @ rest) / float(share @ share))

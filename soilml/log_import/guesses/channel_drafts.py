@@ -23,6 +23,7 @@ from soilml.log_import.guesses.role_words import (
     LEAST_PERCENT,
     MOST_FRACTION,
     USUAL,
+    group,
     name_scores,
     says,
     words_of,
@@ -34,8 +35,6 @@ from soilml.log_import.units import dimension, is_raw_signal
 #: Masses that a scale shows, as forces; any other is taken for kg.
 _AS_FORCE = {"g": "gf", "gram": "gf", "grams": "gf", "lb": "lbf", "pound": "lbf", "pounds": "lbf"}
 _FAR_IN_M = 4.0  # A height of so many m is rather one in mm
-#: Words that say that a column counts the pulses of an encoder.
-_COUNTS = {"count", "counts", "tick", "ticks", "enc", "encoder", "qc", "pulses"}
 _CELLS = "CHANGE: cells that {} are added; leave out others"
 #: What several columns of a channel are.
 _SEVERAL = {
@@ -43,15 +42,6 @@ _SEVERAL = {
     "drawbar_pull": Marked(_CELLS.format("pull together")),
     "sinkage": "the mean of them",
 }
-#: Words of columns that are errors of others, and those that may stand beside them.
-_ERRORS = {*words_of(
-    "std sd sigma err error stderr se sem uncertainty dev deviation stdev stddev fehler"
-    " unsicherheit streuung abweichung cv rms incertezza incertidumbre desv desviacion"
-    " desviación ecart écart u 标准差 误差"
-)}  # fmt: skip
-_BESIDE = {*words_of("of the type standard estandar estándar mean avg average rel")}
-#: Words of a slip that is (r omega - v) / v: ISO 8855, and `GetLongitudinalSlip` of Chrono.
-_OF_TYRES = {"kappa", "long", "longitudinal"}
 
 
 def draft_channels(
@@ -111,12 +101,14 @@ def _draft(
             "per cent, write unit = '%' and remove this line"
         )
         draft.put("definition", SLIP_DEFINITIONS[2], why)
-    elif role == "slip" and says(column.name, _OF_TYRES):
+    elif role == "slip" and says(column.name, "tyres"):
         why = "as of tyres, and of Chrono's rigs; remove this line where it is 1 - v/(r omega)"
         draft.put("definition", SLIP_DEFINITIONS[2], why)
     if role == "wheel_angle" and column.wraps_at:
         draft.put("wraps_at", column.wraps_at, "it starts again there")
-    if role in GEARED and (role != "torque" or says(column.name, ("motor", "mot"))):
+    if role in GEARED and (
+        role != "torque" or not {"motor", "mot"}.isdisjoint(words_of(column.name))
+    ):
         _put_gear_ratio(draft, role, column, stated.get("gear_ratio"))
     if role == "motor_current":
         said, line = stated.get("torque_constant", ("1.0 N m/A", ""))
@@ -139,9 +131,9 @@ def _unit(role: str, column: Candidate, size: float) -> tuple[str, str]:
         return force, f"the log says {column.unit}; as a force that is {force}"
     if column.unit and column.kind is not None:
         return column.unit, ""
-    if role in ("wheel_angle", "wheel_speed") and says(column.name, _COUNTS):
+    if role in ("wheel_angle", "wheel_speed") and says(column.name, "encoder"):
         return "count" if role == "wheel_angle" else "count/s", BY_NAME
-    if role == "wheel_speed" and says(column.name, ("rpm",)):
+    if role == "wheel_speed" and "rpm" in words_of(column.name):
         return "rpm", BY_NAME
     if role == "wheel_angle":
         range_ = column.wraps_at
@@ -172,7 +164,7 @@ def _put_gear_ratio(
 def is_error(candidate: Candidate) -> bool:
     """Whether a column is the error of another one, by its name: `T_std`, `err Fz`."""
     several = len(words_of(candidate.name)) > 1
-    return "±" in candidate.name or (several and says(candidate.name, _ERRORS))
+    return "±" in candidate.name or (several and says(candidate.name, "errors"))
 
 
 def add_errors(drafts: dict[str, Draft], found: Assignment, errors: Sequence[Candidate]) -> None:
@@ -180,7 +172,7 @@ def add_errors(drafts: dict[str, Draft], found: Assignment, errors: Sequence[Can
     for role, column in found.shared.items():
         for error in errors:
             own, plain = (
-                [word for word in words_of(name) if word not in _ERRORS | _BESIDE]
+                [word for word in words_of(name) if word not in group("errors", "of_errors")]
                 for name in (column.name, error.name)
             )
             if own == plain or role in name_scores(" ".join(plain)):

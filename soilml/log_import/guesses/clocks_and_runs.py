@@ -28,9 +28,7 @@ from soilml.log_import.units import factor
 
 _LEAST, _MOST_RUNS = 0.5, 1000  # Lowest score of a clock, and most runs of one file
 _PAUSE = 5.0  # Shortest pause between two runs, s
-#: Words of a column of wheels, those of its number; most wheels, and share of lines that change it.
-_OF_A_WHEEL = {"wheel", "wheels", "motor", "joint", "axle", "drive", "corner", "rad", "actuator"}
-_NUMBERED = {"id", "no", "nr", "number", "index", "idx", "name", "wheel", "num"}
+#: Most wheels that take turns in one column, and share of lines that change it.
 _MOST_WHEELS, _TURNS = 12, 0.2
 _MOST = 400  # Most rows of a table that somebody has made of runs
 Log = Sequence[Recording]
@@ -147,7 +145,7 @@ def _label_column(recordings: Log) -> tuple[str, list[str], bool]:
         numbers = {
             name: [f"{value:g}" for value in values]
             for name, values in recording.columns.items()
-            if ("run" in name_scores(name) or (says(name, _OF_A_WHEEL) and says(name, _NUMBERED)))
+            if ("run" in name_scores(name) or (says(name, "wheel") and says(name, "numbered")))
             and np.all(values == np.round(values))
         }
         for name, cells in (recording.texts | numbers).items():
@@ -157,8 +155,8 @@ def _label_column(recordings: Log) -> tuple[str, list[str], bool]:
                 continue
             if changes == len(labels) - 1 and len(labels) <= len(cells) / 20:
                 return name, labels, False
-            of_wheel = says(name, _OF_A_WHEEL)
-            sides = all(says(label, WHEEL_WORDS) for label in labels)
+            of_wheel = says(name, "wheel")
+            sides = all(says(label, *WHEEL_WORDS) for label in labels)
             take_turns = len(labels) <= _MOST_WHEELS and changes > _TURNS * len(cells)
             if take_turns and "" not in labels and (sides or of_wheel):
                 return name, labels, True
@@ -173,8 +171,7 @@ def _structs_that_are_runs(recordings: Log, clock: str) -> int:
     alike = [recordings[i] for i in alike_structs(recordings)]
     if any(r.clock is not None or clock not in r.columns for r in alike):
         return 0
-    of_wheels = {w for w in WHEEL_WORDS if not w.isdigit()} | {"wheel", "motor", "drive", "axle"}
-    return 0 if any(says(r.name, of_wheels) for r in alike) else len(alike)
+    return 0 if any(says(r.name, "places", "wheel") for r in alike) else len(alike)
 
 
 def _restarts_and_pauses(recordings: Log, column: str, unit: str) -> tuple[int, int, float]:

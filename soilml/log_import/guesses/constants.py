@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import dimension, factor
@@ -43,14 +42,6 @@ _STATED = {
 }
 _WHEELS = re.compile(
     r"\b([0-9]{1,2})[ -]?wheel(?:s|ed)\b|\bwheels\s*[:=,;]\s*([0-9]{1,2})\b", re.IGNORECASE
-)
-#: Numbers in names of files: role, pattern and unit.
-_IN_NAMES = (
-    ("load", r"(?<![a-z])(?:load|w|fz|fn|n)[_=-]?(\d+(?:[.p]\d+)?)n?(?![a-z0-9])", "N"),
-    ("load", r"(?<![a-z0-9.])(\d+(?:\.\d+)?)n(?![a-z0-9])", "N"),
-    ("load", r"(?<![a-z0-9.])(?:load|weight|w|m|fz|fn)?[_=-]?(\d+(?:\.\d+)?)kg(?![a-z0-9])", "kgf"),
-    ("slip", r"(?<![a-z])(?:slip|s)[_=-]?(\d\d?(?:\.\d+)?)(?:pct|percent|%)?(?![0-9a-z])", "%"),
-    ("slip", r"(?<![a-z])(?:slip|s)[_=-]?(-?0\.\d+)(?![0-9])", "1"),
 )
 #: Constants in names of files: name, and pattern of the number and its unit.
 _CONSTANTS_IN_NAMES = tuple(
@@ -106,36 +97,20 @@ def stated_radius(stated: Stated) -> float:
     return 0.0
 
 
-@dataclass(frozen=True)
-class StatedConstants:
-    """Constants that logs state in the lines before their headers, by name."""
-
-    common: Stated  # Those that all logs state alike
-    # Those that differ: a pattern for the number in the line, its unit, and the numbers
-    of_each: dict[str, tuple[str, str, list[str]]]
-
-
-def agreed_constants(logs: Sequence[Sequence[Recording]]) -> StatedConstants:
+def agreed_constants(logs: Sequence[Sequence[Recording]]) -> Stated:
     """The constants that logs state, or the names of their files where all say the same."""
     each = [stated_constants([line for own in log for line in own.about]) for log in logs]
     named = [constants_in_name(log[0].file.stem) for log in logs]
-    alike, differing = {}, {}
+    alike = {}
     for name in dict.fromkeys(name for found in each for name in found):
         said = [found[name] for found in each if name in found]
-        values = list(dict.fromkeys(value for value, _ in said))
-        value, line = said[0]
-        number, _, unit = value.partition(" ")
-        start = max(line.find(number), line.find(number.replace(".", ",")))
-        if len(values) == 1:
+        if len({value for value, _ in said}) == 1:
             alike[name] = said[0]
-        elif start > 0 and len(said) == len(each):
-            pattern = re.escape(line[:start]).replace("\\ ", " ") + r"([+-]?\d+(?:[.,]\d+)?)"
-            differing[name] = (pattern, unit, values)
     for name, one in named[0].items():
         same = {"radius", "diameter"} if name in ("radius", "diameter") else {name}
         if not same & alike.keys() and all(own.get(name, ("",))[0] == one[0] for own in named):
             alike[name] = one
-    return StatedConstants(alike, differing)
+    return alike
 
 
 def constants_in_name(name: str) -> Stated:
@@ -157,12 +132,3 @@ def constants_in_name(name: str) -> Stated:
         if unit or constant == "gear_ratio":
             found[constant] = (f"{number} {unit}".strip(), said)
     return found
-
-
-def number_in_names(role: str, names: Sequence[str]) -> tuple[str, str, list[float]] | None:
-    """A pattern that finds a number for a role in all names of runs, its unit and the numbers."""
-    for kind, pattern, unit in _IN_NAMES:
-        matches = [re.search(pattern, name, re.IGNORECASE | re.ASCII) for name in names]
-        if kind == role and all(matches):
-            return pattern, unit, [float(m[1].replace("p", ".")) for m in matches if m]
-    return None

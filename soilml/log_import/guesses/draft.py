@@ -16,7 +16,7 @@ from soilml.log_import.channels.inputs import Inputs, combined, moving, wheel_in
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.checks.sensors import offset_at_rest
 from soilml.log_import.guesses.columns import Candidate
-from soilml.log_import.guesses.role_words import USUAL, says, words_of
+from soilml.log_import.guesses.role_words import USUAL, says
 from soilml.log_import.mapping.channel_map import ChannelMap, Uncertain
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.mapping.written_map import Marked, WrittenTable
@@ -26,11 +26,6 @@ BY_NAME = "by its name"  # Why a unit is known that no brackets state, as of tic
 _FAR, _SUNK = 0.08, 0.01
 #: Share of the radius that no wheel sinks in at rest; what is more than noise of a reading, m.
 _MOST_AT_REST, _NOISE = 0.3, 0.002
-#: Words of places, whose zero may be anywhere.
-_HEIGHTS = words_of(
-    "height position pos laser distance level elevation hoehe höhe abstand weg altura hauteur"
-    " altezza lvdt"
-)
 _FEWEST = 6  # Fewest means that tell a correlation
 
 
@@ -213,7 +208,7 @@ def put_zero_of_sinkage(drafts: dict[str, Draft], inputs: Inputs, radius: float)
     far = min(_FAR, _MOST_AT_REST * radius) if radius > 0.0 else _FAR
     if not math.isfinite(rest):
         falls = correlation(driving_means(inputs), "sinkage", "torque") < -0.5
-        if says(draft.column.name, _HEIGHTS) or abs(level) > far or falls:
+        if says(draft.column.name, "heights") or abs(level) > far or falls:
             draft.comments["column"] = Marked(
                 f"CHANGE: it reads {1e3 * level:.3g} mm as the wheel drives, and no rest shows "
                 "where the surface is; a distance to it falls as the wheel sinks (reverse = true)"
@@ -222,7 +217,7 @@ def put_zero_of_sinkage(drafts: dict[str, Draft], inputs: Inputs, radius: float)
     falls = abs(level) < abs(rest) - _NOISE
     if abs(rest) < far and abs(level) < _FAR and not falls:
         add = 'add tare = "rest" and bias = 0.01'
-        if says(draft.column.name, _HEIGHTS) and not abs(rest) > _NOISE:
+        if says(draft.column.name, "heights") and not abs(rest) > _NOISE:
             draft.comments["column"] = Marked(
                 "CHANGE: a height is a sinkage where its zero is the undisturbed surface; else "
                 f"{add}"

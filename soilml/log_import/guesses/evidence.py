@@ -40,10 +40,6 @@ _SET = ("load", "slip", "slope")  # Roles that a rig may keep at one value
 _SURELY_PERCENT = 30.0  # As (r omega - v)/v in fractions, a slip of 0.97
 _PAIRS = (("torque", "drawbar_pull"), ("motor_current", "drawbar_pull"), ("torque", "slip"),
           ("sinkage", "slip"), ("sinkage", "torque"), ("motor_current", "torque"))  # fmt: skip
-#: Words of what all wheels have together.
-_OF_ALL = {"total", "gross", "overall", "sum", "vehicle", "rover", "robot", "totale", "gesamt",
-           "battery", "batterie", "bateria", "batteria"}  # fmt: skip
-_OF_NO_MAP = ("odd-row", "constant-reading")  # Hints that doubt rows and sensors
 
 
 @dataclass(frozen=True)
@@ -107,7 +103,7 @@ class Judge:
         draft.rival, draft.second = _rival(role, own, others), left[0] if left else ""
         if role in self.shown and not isinstance(self.shown[role], Marked) and draft.stated_unit:
             draft.physics = self.shown[role]
-        if says(own.name, _OF_ALL) and USUAL[role].per_wheel:
+        if says(own.name, "whole") and USUAL[role].per_wheel:
             draft.against = "its name is of a whole: a wheel has a share of what a rover has"
         if own.constant and role not in _SET:
             draft.against = f"it reads {own.middle:.3g} throughout"
@@ -120,8 +116,7 @@ class Judge:
         rows = Conversion(wheel, None).of(means)
         radius = self._radius(implied) or None
         for hint in hints_of(RowsToCheck(rows, radius, wheel, self.weight)):
-            if hint.code not in _OF_NO_MAP:
-                yield [role for role in hint.about if role in drafts], hint.text
+            yield [role for role in hint.about if role in drafts], hint.text
 
     def _radius(self, implied: float) -> float:
         """The radius as stated, else the largest travel over rotation; 0 where no wheel has it."""

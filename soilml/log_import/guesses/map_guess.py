@@ -12,8 +12,8 @@ from soilml.log_import.channels.runs import run_names, runs_of
 from soilml.log_import.guesses.assignment import assign, axle_of, by_behaviour
 from soilml.log_import.guesses.channel_drafts import add_errors, draft_channels, is_error
 from soilml.log_import.guesses.clocks_and_runs import Division, divide, refuse_a_table_of_runs
-from soilml.log_import.guesses.columns import candidates_of, describe, liveliest
-from soilml.log_import.guesses.constants import agreed_constants, number_in_names, stated_radius
+from soilml.log_import.guesses.columns import candidates_of, describe
+from soilml.log_import.guesses.constants import agreed_constants, stated_radius
 from soilml.log_import.guesses.draft import Draft, driving_means, implied_radius, inputs_of
 from soilml.log_import.guesses.evidence import Judge
 from soilml.log_import.guesses.role_words import CLEAR, USUAL, is_size, says
@@ -27,9 +27,7 @@ from soilml.log_import.units import factor
 
 _USUAL, _SHARE = 2.0, 0.15  # Shortest window for long runs, s, and its share of short ones
 _MOST_WHEELS = 8  # Wheels that may share a mass, where nothing says how many do
-_MOST_LISTED, _LOOKED = 40, 8  # Most columns that are listed, and runs that are looked at
-#: Words of columns of plate and shear tests.
-_OF_PLATES = {"plate", "pressure", "penetration", "annulus", "shear", "platte", "druck"}
+_MOST_LISTED = 40  # Most columns that are listed
 _PLAUSIBLE = (0.02, 0.7)  # Radii of wheels, m
 #: Roles that are needed: what may stand for each, and what a map then says.
 _NEEDED = {
@@ -42,8 +40,8 @@ _NEEDED = {
                      ["# [ground_speed]",
                       '# value = "0.02 m/s +- 1 %"   # a carriage of constant speed']),
 }  # fmt: skip
-#: Uncertainty and unit of what logs state in place of a column.
-_STATED = {"load": ("1 %", "N"), "ground_speed": ("1 %", "m/s"), "slip": ("0.01", "1")}
+#: Uncertainty of what logs state in place of a column.
+_STATED = {"load": "1 %", "ground_speed": "1 %", "slip": "0.01"}
 _HEAD = """\
 # Written by `soilml import --init`. All of it is a guess: look at the lines with
 # CHANGE and NEEDED first, then at the units. Values take a unit and an uncertainty:
@@ -79,14 +77,13 @@ class _Guess:
     def __init__(self, logs: Sequence[Sequence[Recording]]) -> None:
         self.logs = logs
         self.stated = agreed_constants(logs)
-        self.division: Division = divide(logs, self.stated.common)
+        self.division: Division = divide(logs, self.stated)
         self.steady = self.division.runs.each_row
         found = LogMap(
             "map", files=self.division.kinds, time=self.division.time, runs=self.division.runs
         )
         self.runs = runs_of(logs, replace(found, runs=replace(found.runs, each_row=False)))
-        self.run_names = [run.name for run in self.runs]
-        self.run = liveliest(self.runs[:_LOOKED])
+        self.run = self.runs[0]
         clocks = {found.time.column, *(kind.time_column for kind in found.files)}
         columns = candidates_of(self.run.recordings, self.steady)
         self.columns = [c for c in columns if c.name not in clocks]
@@ -123,12 +120,12 @@ class _Guess:
                 draft = drafts[name][role]
                 left = [key for key in draft.keys if key not in alike[role]]
                 tables.append(draft.only(f"wheels.{name}.{role}", left))
-        tables += [] if self.steady else self._window_tables()
+        tables += [] if self.steady else [self._window_table()]
         return WrittenMap(self._head(), tables, evidence)
 
     def _drafts(self) -> tuple[dict[str, dict[str, Draft]], str]:
         """The channels of each wheel, of "" where there is one, and the evidence for them."""
-        stated, found = self.stated.common, self.found
+        stated, found = self.stated, self.found
         judge = Judge(stated_radius(stated), self._weight(), found.others, self.usable,
                       self.reasons, not self.steady)  # fmt: skip
         explained = []
@@ -154,7 +151,7 @@ class _Guess:
 
     def _weight(self) -> tuple[float, float] | None:
         """Least and largest weight on each wheel by the stated mass, N; None without one."""
-        stated = self.stated.common
+        stated = self.stated
         if "mass" not in stated:
             return None
         count = int(stated.get("wheels", (str(max(1, len(self.found.wheels))), ""))[0])
@@ -174,7 +171,7 @@ class _Guess:
         lines += [f"#   {line}" for line in describe(listed, self.run.recordings)]
         if len(self.columns) > len(listed):
             lines.append(f"#   and {len(self.columns) - len(listed)} more")
-        of_plates = any(says(c.address, _OF_PLATES) for c in self.columns)
+        of_plates = any(says(c.address, "plates") for c in self.columns)
         if of_plates and not self.found.roles() & {"wheel_speed", "wheel_angle", "slip"}:
             lines.append("# Plate or shear tests, it seems: `soilml bevameter` takes those.")
         notes = dict.fromkeys(note for log in self.logs for r in log for note in r.notes)
@@ -182,7 +179,7 @@ class _Guess:
 
     def _wheel_table(self, drafts: Mapping[str, Draft]) -> WrittenTable:
         """[wheel]: the radius that the logs state, or a line that asks for it."""
-        wheel, stated = WrittenTable("wheel"), self.stated.common
+        wheel, stated = WrittenTable("wheel"), self.stated
         if key := next((key for key in ("radius", "diameter") if key in stated), ""):
             value, line = stated[key]
             asked = Marked(f"stated in the {line}") if "CHANGE" in line else ""
@@ -204,8 +201,8 @@ class _Guess:
         wheel.after.append(Marked(line) if needed else line)
         return wheel
 
-    def _window_tables(self) -> list[WrittenTable]:
-        """[windows], with shorter windows for short runs, and an example of [[leave_out]]."""
+    def _window_table(self) -> WrittenTable:
+        """[windows], with shorter windows for short runs."""
         lengths = sorted(times[-1] - times[0] for run in self.runs for times in run.times)
         middle = lengths[len(lengths) // 2] if lengths else 0.0
         shortest = min(_USUAL, float(f"{max(_SHARE * middle, 0.05):.1g}"))
@@ -213,19 +210,12 @@ class _Guess:
         table.put("shortest", f"{shortest:g} s")
         table.put("settle", f"{min(0.5, shortest / 4.0):g} s", "left out after each change")
         table.put("sensitivity", 1, "2 finds smaller changes, 0.5 only larger ones")
-        table.after = ["# within = [5, 60]  # s after the start: only this part of each run"]
-        example = [
-            "# [[leave_out]]  # a stretch that somebody disturbed",
-            f'# run = "{self.runs[0].name}"',
-            "# from = 12.0  # s",
-            '# why = "the carriage was pulled"',
-        ]
-        return [table, WrittenTable(before=example)]
+        return table
 
     def _absent_load(self) -> WrittenTable:
-        """What stands for a load that no column has: what logs or names say, or the mass."""
-        common = self.stated.common
-        if said := self._said("load", logs="mass" not in common):
+        """What stands for a load that no column has: what logs say, or the mass."""
+        common = self.stated
+        if "mass" not in common and (said := self._said("load")):
             return said
         count, why = max(1, len(self.found.wheels), len(self.division.labels)), ""
         if count == 1:
@@ -241,7 +231,8 @@ class _Guess:
             return table
         wheels = f"# {key_line('wheels', count, why)}"
         table.after = [
-            Marked("# [vehicle]                   # NEEDED, or [load] value = '60 N +- 1 N'"),
+            Marked("# [vehicle]                   # NEEDED, or [load] value = '60 N +- 1 N', or"),
+            "# file_name = 'load_(\\d+)N'     # in [load], where the names of the logs have it",
             '# mass = "6.1 kg +- 0.1 kg"   # all that stands on the wheels',
             Marked(wheels) if isinstance(why, Marked) else wheels,
         ]
@@ -269,31 +260,14 @@ class _Guess:
             return WrittenTable(before=[line, f"# column = {names[0]}"])
         return None
 
-    def _said(self, role: str, logs: bool = True) -> WrittenTable | None:
-        """The table of a role that the lines before the headers state, of all logs or of each, or
-        whose number stands in the names of all runs.
-        """
-        std, unit = _STATED[role]
-        if logs and role in self.stated.common:
-            value, line = self.stated.common[role]
+    def _said(self, role: str) -> WrittenTable | None:
+        """The table of a role that the lines before the headers of all logs state alike."""
+        std = _STATED[role]
+        if role in self.stated:
+            value, line = self.stated[role]
             why = f"stated in the log: {line[:60]}"
             return WrittenTable(role, {"value": f"{value} +- {std}"}, {"value": why})
-        if logs and role in self.stated.of_each:
-            pattern, own, values = self.stated.of_each[role]
-            if role == "slip" and any(float(value.split()[0]) > 1.0 for value in values):
-                unit = "%"
-            table = WrittenTable(role)
-            table.put("head", pattern, f"the logs state {', '.join(values[:4])}")
-            table.put("unit", own or unit)
-            if role == "slip":
-                why = Marked("CHANGE: how far the slip may be from what was set")
-                table.put("noise", 0.01, why)
-            return table
-        if (in_name := number_in_names(role, self.run_names)) is None:
-            return None
-        pattern, unit, numbers = in_name
-        why = f"the names say {', '.join(f'{n:g}' for n in numbers[:4])}"
-        return WrittenTable(role, {"file_name": pattern, "unit": unit}, {"file_name": why})
+        return None
 
     def _perhaps(self, role: str) -> list[str]:
         """Columns of the unit of a role that nothing uses and that vary: one may be the role."""

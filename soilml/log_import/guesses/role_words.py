@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.optional_imports import tomllib
@@ -69,27 +70,7 @@ USUAL = {
 #: Score from which a name says the role whatever the topic is called; least letters of a word that
 #: says it in full.
 CLEAR, _FULL = 4.0, 4
-#: Words that say which wheel a column belongs to.
-_PLACES = ("left", "right", "front", "rear", "middle", "mid", "centre", "center", "back")
-WHEEL_WORDS = (
-    *("fl", "fr", "rl", "rr", "ml", "mr", "cl", "cr", "bl", "br"),
-    *("lf", "rf", "lr", "lm", "rm", "lb", "rb"), *_PLACES, *"12345678",
-)  # fmt: skip
-#: Words of topics and columns that say nothing of the quantity.
-_FILLERS = ("state", "states", "data", "status", "sensor", "feedback", "measured", "actual", "raw",
-            "mean", "avg", "average")  # fmt: skip
-#: Words that change nothing beside those of a quantity.
-_BESIDE = ("rig", "bench", "the", "des", "del", "filtered", "filt", "dynamic", "transducer", "axis",
-           "reaction", "fuerza", "forza", "field", "twist", "wrench", "msg", "taux")  # fmt: skip
-#: Words whose number is that of a bus, a port or an input, and of no wheel.
-_BUSES = {"can", "bus", "port", "node", "adc", "ch", "channel", "ai", "uart", "com", "usb", "dev"}
-#: Words of counters of lines, which are no clock however evenly they rise.
-COUNTERS = {"seq", "sequence", "count", "counter", "sample", "samples", "index", "idx", "frame",
-            "id", "no", "nr", "number", "row", "line", "record"}  # fmt: skip
-#: Last parts of German compounds.
-_HEADS = ("geschwindigkeit", "drehzahl", "spannung", "pressung", "verschiebung", "durchmesser",
-          "radius", "einsinkung", "tiefe", "breite", "länge", "laenge", "fläche", "flaeche",
-          "druck", "kraft", "last", "moment", "strom", "winkel", "weg")  # fmt: skip
+WHEEL_WORDS = ("places", "corners")  # Groups of words that say which wheel a column belongs to
 #: Words of columns with the size of the wheel of each row, and their signs alone.
 _SIZES = re.compile(
     r"radius|radio|rayon|raggio|dia|diam|di[aáà]m[eèé]tr[eo]|diameter|durchmesser|width|breite|"
@@ -110,9 +91,21 @@ def words_of(name: str) -> list[str]:
     return [word.lower() for word in _WORD.findall(_CAMEL.sub(" ", name))]
 
 
-def says(name: str, known: Collection[str]) -> bool:
-    """Whether a name has one of these words."""
-    return not {*known}.isdisjoint(words_of(name))
+@cache
+def _content() -> dict[str, Any]:
+    """The file beside this one."""
+    return tomllib.loads(Path(__file__).with_name("role_words.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def group(*names: str) -> tuple[str, ...]:
+    """The words of groups of [words] in the file beside this one."""
+    return tuple(word for name in names for word in _content()["words"][name].split())
+
+
+def says(name: str, *groups: str) -> bool:
+    """Whether a name has a word of these groups."""
+    return not {*group(*groups)}.isdisjoint(words_of(name))
 
 
 def is_size(name: str) -> bool:
@@ -125,7 +118,7 @@ def parts_of(words: Sequence[str]) -> list[str]:
     """Words with German compounds as their two parts: raddrehzahl -> rad, drehzahl."""
     found = []
     for word in words:
-        head = next((h for h in _HEADS if word.endswith(h) and len(word) > len(h) + 2), "")
+        head = next((h for h in group("heads") if word.endswith(h) and len(word) > len(h) + 2), "")
         found += [word.removesuffix(head), head] if head else [word]
     return found
 
@@ -138,18 +131,17 @@ def wheel_word(name: str) -> tuple[str, ...]:
     words = words_of(name)
     return tuple(
         word for word, last in zip(words, ["", *words], strict=False)
-        if word in WHEEL_WORDS and not (word.isdigit() and last in _BUSES)
+        if word in group(*WHEEL_WORDS) and not (word.isdigit() and last in group("buses"))
     )  # fmt: skip
 
 
 @cache
 def _patterns() -> dict[str, list[tuple[float, re.Pattern[str]]]]:
-    """Role -> weights and patterns, from the file beside this one."""
-    text = Path(__file__).with_name("role_words.toml").read_text(encoding="utf-8")
+    """Role -> weights and patterns."""
     return {
         role: [(float(weight), re.compile(pattern)) for weight, pattern in entries]
-        for role, entries in tomllib.loads(text).items()
-    }
+        for role, entries in _content().items() if role != "words"
+    }  # fmt: skip
 
 
 def _readings_of(name: str) -> Iterator[str]:
@@ -159,8 +151,8 @@ def _readings_of(name: str) -> Iterator[str]:
     """
     words = words_of(name)
     for own in (words, parts_of(words)):
-        for left_out in ((), _PLACES, _FILLERS, (*_PLACES, *_FILLERS)):
-            yield " ".join(word for word in own if word not in left_out)
+        for left_out in ((), ("places",), ("fillers",), ("places", "fillers")):
+            yield " ".join(word for word in own if word not in group(*left_out))
 
 
 def name_scores(name: str) -> dict[str, float]:
@@ -178,7 +170,7 @@ def _known_words() -> frozenset[str]:
     """The words of all roles, and those that may stand beside them."""
     patterns = (pattern.pattern for own in _patterns().values() for _, pattern in own)
     words = (word for text in patterns for word in _WORD.findall(re.sub(r"\\.", " ", text)))
-    return frozenset({*words, *WHEEL_WORDS, *_FILLERS, *_BESIDE})
+    return frozenset({*words, *group(*WHEEL_WORDS, "fillers", "beside")})
 
 
 def says_role(role: str, name: str) -> bool:

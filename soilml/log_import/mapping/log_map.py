@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
@@ -13,9 +12,7 @@ from soilml.errors import InputError
 from soilml.io.declared_settings import (
     For,
     Key,
-    Numbers,
     OneOf,
-    Pattern,
     named_tables,
     take_declared,
 )
@@ -101,9 +98,6 @@ class WindowSettings:
     shortest: Annotated[float, UncertainIn("s", above=0.0, exact=True)] = 2.0
     settle: Annotated[float, _SECONDS] = 0.5
     sensitivity: Annotated[float, Parameter("1", 1e-9, 1e9, "2 finds smaller changes")] = 1.0
-    within: Annotated[
-        tuple[float, float], Numbers("two times in s after the start of a run, such as [5, 20]", 2)
-    ] = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True)
@@ -148,20 +142,12 @@ class WheelLegMap:
 
 @dataclass(frozen=True)
 class WheelKeys:
-    """[wheel], [wheels.NAME] and [gears.NAME]: radius and gear."""
+    """[wheel] and [wheels.NAME]: radius and gear."""
 
     radius: Annotated[Uncertain | None, UncertainIn("m", above=0.0)] = None
     diameter: Annotated[Uncertain | None, UncertainIn("m", above=0.0)] = None
-    gear: Annotated[str, For(("", "wheel"))] = ""
-    gear_from: Annotated[
-        re.Pattern[str] | None, For(("", "wheel")), Pattern((0, 1), "the name of the gear")
-    ] = None
+    gear: str = ""
     axle: Annotated[str, For(("wheel",)), OneOf(("front", "middle", "rear", ""))] = ""
-
-    def __post_init__(self) -> None:
-        """Raise `InputError` for a gear that is given twice."""
-        if self.gear and self.gear_from:
-            raise InputError("has gear and gear_from; give one of them")
 
     @property
     def size(self) -> Uncertain | None:
@@ -171,17 +157,13 @@ class WheelKeys:
 
 @dataclass(frozen=True)
 class WheelMap:
-    """A wheel: its radius (m), its channels by role, and where it stands.
-
-    `gear_pattern` finds its gear in the name of each run or file: group 1, or the whole match.
-    """
+    """A wheel: its radius (m), its channels by role, its gear, and where it stands."""
 
     name: str
     radius: Uncertain | None
     channels: dict[str, ChannelMap]
     gear: str = ""
     axle: str = ""
-    gear_pattern: re.Pattern[str] | None = None
     leg: WheelLegMap | None = None  # Where the wheel has legs: each stance is a row
 
 
@@ -197,7 +179,6 @@ class LogMap:
     vehicle: Vehicle | None = None
     windows: WindowSettings = field(default_factory=WindowSettings)
     left_out: tuple[LeaveOut, ...] = ()
-    gears: Mapping[str, Uncertain] = field(default_factory=dict)  # Radius (m) of each gear
 
 
 def read_map(path: str | os.PathLike[str]) -> LogMap:
@@ -224,12 +205,6 @@ def _take_map(settings: Settings) -> LogMap:
         if radius is not None or runs.each_row:
             settings.fail("has [wheel_leg] beside [wheel] radius or [runs] each_row; remove one")
         radius = leg.length
-    gears = {n: g.size for n, g in named_tables(settings, "gears", WheelKeys, "gear").items()}
-    if bare := [name for name, size in gears.items() if size is None]:
-        settings.fail(
-            f"[gears.{bare[0]}]: the radius is missing; needed is radius or diameter, such as "
-            "'0.15 m +- 1 %'"
-        )
     named = settings.table("wheels")
     own_tables = _with_shared_keys(settings, named.content)
     shared = _take_channels(settings, leg is not None)
@@ -240,11 +215,10 @@ def _take_map(settings: Settings) -> LogMap:
             own = Settings(own_tables.get(name, {}), named.table(name).where, settings.folder)
             channels = shared | _take_channels(own, leg is not None)
             keys = take_declared(WheelKeys, own, "wheel")
-        gear, pattern = keys.gear or common.gear, keys.gear_from or common.gear_from
-        size = keys.size or gears.get(gear) or radius
-        wheels.append(WheelMap(name, size, channels, gear, keys.axle, pattern, leg))
+        size, gear = keys.size or radius, keys.gear or common.gear
+        wheels.append(WheelMap(name, size, channels, gear, keys.axle, leg))
     for wheel in wheels:
-        _check_wheel(settings, wheel, vehicle, bool(gears))
+        _check_wheel(settings, wheel, vehicle)
     found = LogMap(
         source=settings.where,
         wheels=tuple(wheels),
@@ -254,7 +228,6 @@ def _take_map(settings: Settings) -> LogMap:
         vehicle=vehicle,
         windows=take_declared(WindowSettings, settings.table("windows")),
         left_out=tuple(take_declared(LeaveOut, one) for one in settings.tables("leave_out")),
-        gears={name: size for name, size in gears.items() if size is not None},
     )
     settings.finish()
     return found
@@ -289,9 +262,7 @@ def _take_channels(settings: Settings, with_legs: bool) -> dict[str, ChannelMap]
     }
 
 
-def _check_wheel(
-    settings: Settings, wheel: WheelMap, vehicle: Vehicle | None, with_gears: bool
-) -> None:
+def _check_wheel(settings: Settings, wheel: WheelMap, vehicle: Vehicle | None) -> None:
     """Raise `InputError` where slip or load cannot follow from the channels of a wheel."""
     has = wheel.channels.keys()
     of = f" of the wheel {wheel.name!r}" if wheel.name else ""
@@ -302,8 +273,7 @@ def _check_wheel(
                     f"the {words}{of} is missing, from which slip follows; needed is one of "
                     f"{', '.join(f'[{n}]' for n in needed)}, or [slip]"
                 )
-        by_gear = with_gears and wheel.gear_pattern is not None
-        if wheel.radius is None and "rim_speed" not in has and not by_gear:
+        if wheel.radius is None and "rim_speed" not in has:
             settings.fail(
                 f"[wheel] radius{of} is missing; needed is the radius at which slip is defined, "
                 "such as radius = '0.15 m +- 1 %'"

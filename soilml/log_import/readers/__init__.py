@@ -28,9 +28,6 @@ _READERS = {
     ".mat": ("matlab", "read_matlab"),
     ".h5": ("matlab", "read_matlab"),
     ".hdf5": ("matlab", "read_matlab"),
-    ".json": ("json_lines", "read_json_log"),
-    ".jsonl": ("json_lines", "read_json_log"),
-    ".ndjson": ("json_lines", "read_json_log"),
     ".mcap": ("bags", "read_bag"),
     ".bag": ("bags", "read_bag"),
 }
@@ -39,6 +36,8 @@ _LONG = ("read_delimited_text", "read_bag")  # Readers that show their progress
 _OTHERS = {
     **dict.fromkeys((".xls", ".xlsb", ".ods"), "is a spreadsheet; save it as .xlsx"),
     **dict.fromkeys((".gz", ".zip", ".bz2", ".xz", ".7z", ".tar"), "is packed; unpack it"),
+    **dict.fromkeys((".json", ".jsonl", ".ndjson"), "is JSON; save it as CSV or Parquet"),
+    ".db3": "is part of a ROS 2 bag; give its folder",
     ".tdms": "is a binary file of LabVIEW; save it as text (.lvm or CSV)",
 }
 #: Ends of the ranges of integers, which converters without a signal show.
@@ -62,16 +61,8 @@ def read_log(path: str | Path, progress: Callable[[int], None] | None = None) ->
     suffix = file.suffix.lower()
     if suffix in _OTHERS and file.is_file():
         raise InputError(f"{file} {_OTHERS[suffix]} and import that")
-    in_bag = suffix == ".db3" and file.is_file()
-    if in_bag:
-        file = file.parent
     if file.is_dir():
         if not (file / "metadata.yaml").is_file():
-            if in_bag:
-                raise InputError(
-                    f"{path} is not in the folder of a ROS 2 bag; needed is a metadata.yaml beside "
-                    "it"
-                )
             raise InputError(
                 f"{file} is a folder; needed are log files, or the folder of a ROS 2 bag, which "
                 "has a metadata.yaml"

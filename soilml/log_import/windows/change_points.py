@@ -1,8 +1,7 @@
-"""Where the means of channels change: pieces of a run, and transients at the ends of a piece."""
+"""Where the means of channels change: pieces of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -12,12 +11,6 @@ from soilml.arrays import Floats
 #: Numbers of values whose means show the long-run noise, and fewest such means.
 _WIDTHS, _FEWEST_MEANS = (2, 4, 8, 12), 16
 _PENALTY = 2.0  # Factor of the penalty, for long-run noise that is not fully seen
-#: Quantities whose transients count, number of means that a window is divided into, and the
-#: largest share of it that is cut off at the beginning and at the end.
-_WATCHED, _MEANS = ("slip", "torque"), 50
-_MOST_BEFORE, _MOST_AFTER = 0.4, 0.15
-#: The rule has to lower its criterion to this share: noise alone lowers it by a few per cent.
-_GAIN = 0.85
 
 
 def change_points(values: Floats, penalty: float, shortest: int = 1) -> list[int]:
@@ -81,49 +74,3 @@ def _noise(values: Floats) -> Floats:
     """Standard deviation of each channel (channels,) from the median of its differences."""
     steps = np.abs(np.diff(values, axis=0))
     return np.asarray(1.4826 * np.median(steps, axis=0) / np.sqrt(2.0))
-
-
-def without_transients(
-    time: Floats, quantities: Mapping[str, Floats], start: float, stop: float
-) -> tuple[float, float]:
-    """Ends of the window (s) without the settling after its beginning and a change at its end.
-
-    The part that is kept has the smallest sum of squared deviations over the square of its length:
-    the marginal standard error rule of White, "An effective truncation heuristic for bias reduction
-    in simulation output", Simulation 69 (1997), here for the sum of slip and torque in units of
-    their scatter in the middle of the window.
-    """
-    rows = np.flatnonzero((time >= start) & (time <= stop))
-    count = min(_MEANS, rows.size // 4)
-    if count < 10:
-        return start, stop
-    edges = np.linspace(0, rows.size, count + 1).astype(int)
-    columns = []
-    for name in _WATCHED:
-        values = quantities.get(name, np.zeros(0))
-        if values.size != time.size:
-            continue
-        means = np.asarray([part.mean() for part in np.split(values[rows], edges[1:-1])])
-        middle = means[count // 4 : -count // 4]
-        if np.isfinite(means).all() and np.ptp(middle) > 0.0:
-            columns.append((means - middle.mean()) / middle.std())
-    if not columns:
-        return start, stop
-    series = np.stack(columns, axis=1)
-    first = _cheapest(series, int(_MOST_BEFORE * count))
-    last = count - _cheapest(series[first:][::-1], int(_MOST_AFTER * count))
-    own = time[rows]
-    return (
-        start if first == 0 else float(own[edges[first]]),
-        stop if last == count else float(own[edges[last] - 1]),
-    )
-
-
-def _cheapest(series: Floats, most: int) -> int:
-    """How many of the first values to leave out, at most `most`."""
-    costs = [
-        float(np.sum((kept - kept.mean(axis=0)) ** 2)) / len(kept) ** 2
-        for kept in (series[i:] for i in range(most + 1))
-    ]
-    best = int(np.argmin(costs))
-    return best if costs[best] < _GAIN * costs[0] else 0

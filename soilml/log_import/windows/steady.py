@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import groupby, pairwise
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.log_import.mapping.log_map import LeaveOut, WindowSettings
-from soilml.log_import.windows.change_points import steady_pieces, without_transients
+from soilml.log_import.windows.change_points import steady_pieces
 from soilml.log_import.windows.mean_errors import mean_error
 from soilml.remarks import Remark
 
@@ -54,25 +54,23 @@ def steady_windows(
     motion: What is zero where the wheel rests (n,); None where nothing says it.
     """
     search = _Search(time, quantities, settings, motion)
-    parts, found = searched_parts(time, settings, left_out)
+    parts, found = searched_parts(time, left_out)
     for part in parts:
         rows = np.flatnonzero(search.inside(*part))
         for start, stop in search.pieces(rows) if rows.size > 1 else ():
-            found.append(search.judged(start, stop))
-    return _joined(sorted(found, key=lambda s: s.start), settings)
+            found.append(Stretch(start, stop, search.why_not(start, stop)))
+    return sorted(found, key=lambda s: s.start)
 
 
 def searched_parts(
-    time: Floats, settings: WindowSettings, left_out: tuple[LeaveOut, ...]
+    time: Floats, left_out: tuple[LeaveOut, ...]
 ) -> tuple[list[tuple[float, float]], list[Stretch]]:
     """The parts of a run (from, until; s) in which rows are searched, and what the map leaves out.
 
     time: Grid (n,), s.
     """
     first, last = float(time[0]), float(time[-1])
-    low, high = settings.within
-    outside = Remark("outside", "outside of [windows] within", severity="note")
-    out = [Stretch(first, min(low, last), outside), Stretch(max(high, first), last, outside)]
+    out = []
     for entry in left_out:
         why = Remark("left-out-by-map", entry.why, severity="note")
         out.append(Stretch(max(entry.start, first), min(entry.stop, last), why))
@@ -81,18 +79,6 @@ def searched_parts(
     stops = [*(s.start for s in out), last]
     parts = [(float(a), b) for a, b in zip(starts, stops, strict=True) if a < b]
     return parts, out
-
-
-def _joined(stretches: list[Stretch], settings: WindowSettings) -> list[Stretch]:
-    """Stretches of which those that are too short, and follow each other, are one."""
-    found: list[Stretch] = []
-    text = f"nothing stays the same for {settings.shortest:g} s, as if someone had touched it"
-    for is_short, group in groupby(stretches, lambda s: s.why and s.why.code == "too-short"):
-        own = list(group)
-        if is_short and len(own) >= 3:
-            own = [Stretch(own[0].start, own[-1].stop, Remark("nothing-steady", text))]
-        found += own
-    return found
 
 
 @dataclass(frozen=True)
@@ -154,20 +140,13 @@ class _Search:
         """Samples (n,) of a stretch."""
         return np.asarray((self.time >= start) & (self.time <= stop))
 
-    def judged(self, start: float, stop: float) -> Stretch:
-        """A piece as one stretch; where it drifts, as its longest part that is steady."""
-        a, b = without_transients(self.time, self.quantities, start, stop)
-        why = self.why_not(a, b)
-        stretch = Stretch(a, b, why)
-        return self.shortened(stretch) if why and why.code == "not-steady" else stretch
-
     def why_not(self, start: float, stop: float) -> Remark | None:
-        """Why a stretch is no steady window; a part of one that is `not-steady` may be one."""
+        """Why a stretch is no steady window; None where it is one."""
         rows, shortest = self.inside(start, stop), self.settings.shortest
         if self.rests(rows):
             return Remark("at-rest", "the wheel is at rest", severity="note")
         if stop - start < shortest:
-            text = f"{stop - start:.2g} s are too short (less than {shortest:g} s)"
+            text = f"nothing stays the same for {shortest:g} s"
             return Remark("too-short", text, severity="note")
         if not rows.any():
             return Remark("no-samples", "there are no samples")
@@ -193,16 +172,6 @@ class _Search:
                 text = f"it is not steady: {name} changes by {change:.2g} in it"
                 return Remark("not-steady", text, (name,), "note")
         return None
-
-    def shortened(self, stretch: Stretch) -> Stretch:
-        """The longest end or beginning of a drifting stretch that is steady, else all of it."""
-        start, stop = stretch.start, stretch.stop
-        length = stop - start
-        for share in (0.8, 0.65, 0.5, 0.35):
-            for a, b in ((stop - share * length, stop), (start, start + share * length)):
-                if b - a >= self.settings.shortest and not self.drift(self.inside(a, b)):
-                    return Stretch(a, b)
-        return stretch
 
     def rests(self, rows: NDArray[np.bool_]) -> bool:
         """Whether the wheel is at rest in a window; not where nothing says it."""

@@ -103,7 +103,7 @@ def test_rows_estimated_together_have_larger_errors_the_more_alike_they_are():
 def learned():
     """A remainder of the torque that is known at two slips under one load."""
     part = RemainderPart(
-        "torque_Nm", "", 0.3, 0.6, 0.3, 0.6, (0.1, 0.4), (60.0, 60.0),
+        "torque_Nm", 0.3, 0.6, 0.3, 0.6, (0.1, 0.4), (60.0, 60.0),
         ((0.1, 60.0), (0.4, 60.0)), (1.0, 0.5), ((0.9, 0.0), (0.0, 0.9)), ((0.1,), (0.0,)),
     )  # fmt: skip
     return Remainder((part,))

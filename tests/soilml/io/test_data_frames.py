@@ -43,13 +43,6 @@ def test_a_frame_is_checked_as_a_file_is(change, said):
         read_table(Frame(COLUMNS | change))
 
 
-def test_a_table_goes_back_to_arrow():
-    table = read_table(Frame(COLUMNS))
-    again = read_table(table.to_arrow())
-    assert again["run"].tolist() == table["run"].tolist()
-    assert np.array_equal(again["torque_Nm"], table["torque_Nm"], equal_nan=True)
-
-
 def test_a_selection_of_a_frame_of_pandas_and_its_file_are_read_without_their_index(tmp_path):
     pd = pytest.importorskip("pandas")
     frame = pd.DataFrame(COLUMNS).iloc[[0, 2]].set_index(pd.Index([7, 7]))

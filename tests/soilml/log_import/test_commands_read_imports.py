@@ -119,10 +119,7 @@ column = "v"
 
 
 def test_rows_of_several_radii_are_refused_by_name(tmp_path, capsys):
-    columns = rows(test=["R130_1"] * 3 + ["R200_1"] * 3)
-    text = MAP.replace("radius = 0.13", 'gear_from = "(R[0-9]+)"')
-    text += "[gears.R130]\nradius = 0.13\n[gears.R200]\nradius = 0.2\n"
-    model, out = imported(tmp_path, columns, text)
+    columns = rows(wheel_radius_m=[0.13] * 3 + [0.2] * 3)
+    model, out = imported(tmp_path, columns, MAP.replace("radius = 0.13", ""))
     assert main(["identify", model, out]) == 2
-    said = capsys.readouterr().err
-    assert "gear names R130, R200" in said and "--gear" in said
+    assert "wheel_radius_m: 0.2 given" in capsys.readouterr().err

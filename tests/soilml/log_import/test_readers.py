@@ -86,14 +86,13 @@ def test_a_log_without_header_numbers_its_columns(tmp_path):
         ("a.ods", b"PK", "save it as .xlsx and import that"),
         ("a.csv.gz", b"PK", "unpack it and import that"),
         ("a.tdms", b"TDSm", "save it as text"),
-        ("a.json", b"[1, 2, 3]", "needed is a JSON object with numbers for each sample"),
-        ("a.jsonl", b'{"t": 0}\nno\n', "needed is a JSON object with numbers for each sample"),
+        ("a.json", b"[1, 2, 3]", "save it as CSV or Parquet and import that"),
         ("a.h5", b"\x89HDF cut off", "is not a complete HDF5 file"),
         ("a.mat", b"MATLAB 5.0 MAT-file, cut off" + bytes(200), "is not a complete MATLAB file"),
         ("a.parquet", b"PAR1", "is not a complete Parquet file"),
         ("a.mcap", b"not mcap", "cannot be read as a bag"),
         ("a.bag", b"not a bag", "cannot be read as a bag"),
-        ("a.db3", b"not a bag", "needed is a metadata.yaml beside it"),
+        ("a.db3", b"not a bag", "give its folder"),
     ],
 )
 def test_what_cannot_be_read_is_said_in_one_line(tmp_path, name, content, words):

@@ -6,7 +6,7 @@ import pytest
 from soilml.cli import main
 from soilml.errors import InputError
 from soilml.log_import import import_log, init_map
-from soilml.remarks import about, texts
+from soilml.remarks import texts
 
 PAPER = """\
 Test no.;slip (%);T [mN m];T std [mN m];Fz (kgf);z (cm);DP (N);sigma DP (%);pitch (deg)
@@ -46,7 +46,6 @@ def test_names_units_and_errors_are_guessed(paper):
     assert "time_s" not in rows and "[windows]" not in text and "[time]" not in text
     assert found.runs == 2 and found.bias["torque_Nm"].share == pytest.approx(0.02)
     assert "row 3 of paper.csv is left out: its slip is not known" in texts(found.remarks)
-    assert about(found.remarks, "no-standard-errors") == {"sinkage"}
 
 
 def test_the_command_writes_table_and_report(paper, capsys, monkeypatch):

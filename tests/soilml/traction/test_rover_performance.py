@@ -99,7 +99,7 @@ def test_bands_of_a_rover_have_the_error_of_its_model(case):
     table = measured(case, list(FOUR))
     plain = pull_report(case, table, slopes=SLOPES, exact_model=True)
     part = RemainderPart(
-        "torque_Nm", "", 0.2, 0.3, 0.3, 0.6, (0.1, 0.5), (20.0, 20.1),
+        "torque_Nm", 0.2, 0.3, 0.3, 0.6, (0.1, 0.5), (20.0, 20.1),
         ((0.3, 20.0),), (0.0,), ((0.0,),), ((0.0,),),
     )  # fmt: skip
     learned = replace(case, remainder=Remainder((part,)))
