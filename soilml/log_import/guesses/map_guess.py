@@ -232,7 +232,7 @@ class _Guess:
         wheels = f"# {key_line('wheels', count, why)}"
         table.after = [
             Marked("# [vehicle]                   # NEEDED, or [load] value = '60 N +- 1 N', or"),
-            "# file_name = 'load_(\\d+)N'     # in [load], where the names of the logs have it",
+            "# # [load] file_name = 'load_(\\d+)N' where the names of the logs have it",
             '# mass = "6.1 kg +- 0.1 kg"   # all that stands on the wheels',
             Marked(wheels) if isinstance(why, Marked) else wheels,
         ]
