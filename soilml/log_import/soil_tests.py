@@ -147,7 +147,7 @@ def _complete(path: str, own: Recording, found: dict[str, Floats], taken: list[s
     if "pressure_Pa" in found and "plate_width_m" in found:
         found.setdefault("plate_length_m", found["plate_width_m"])  # a pressure needs no area
     if "sinkage_m" in found and not {*_PLATES} & found.keys():
-        if radius := stated_radius(agreed_constants([[own]])):
+        if radius := stated_radius(agreed_constants([[own]]).common):
             found["plate_radius_m"] = np.full(len(own), radius)
             taken.append(f"plate_radius_m = {radius:g} m, as the file or its name states")
         elif "load_N" in found and any(_says(name, "plates") for name in own.columns):

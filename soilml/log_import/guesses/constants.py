@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import dimension, factor
@@ -97,20 +98,36 @@ def stated_radius(stated: Stated) -> float:
     return 0.0
 
 
-def agreed_constants(logs: Sequence[Sequence[Recording]]) -> Stated:
+@dataclass(frozen=True)
+class StatedConstants:
+    """Constants that logs state in the lines before their headers, by name."""
+
+    common: Stated  # Those that all logs state alike
+    # Those that differ: a pattern for the number in the line, its unit, and the numbers
+    of_each: dict[str, tuple[str, str, list[str]]]
+
+
+def agreed_constants(logs: Sequence[Sequence[Recording]]) -> StatedConstants:
     """The constants that logs state, or the names of their files where all say the same."""
     each = [stated_constants([line for own in log for line in own.about]) for log in logs]
     named = [constants_in_name(log[0].file.stem) for log in logs]
-    alike = {}
+    alike, differing = {}, {}
     for name in dict.fromkeys(name for found in each for name in found):
         said = [found[name] for found in each if name in found]
-        if len({value for value, _ in said}) == 1:
+        values = list(dict.fromkeys(value for value, _ in said))
+        value, line = said[0]
+        number, _, unit = value.partition(" ")
+        start = max(line.find(number), line.find(number.replace(".", ",")))
+        if len(values) == 1:
             alike[name] = said[0]
+        elif start > 0 and len(said) == len(each):
+            pattern = re.escape(line[:start]).replace("\\ ", " ") + r"([+-]?\d+(?:[.,]\d+)?)"
+            differing[name] = (pattern, unit, values)
     for name, one in named[0].items():
         same = {"radius", "diameter"} if name in ("radius", "diameter") else {name}
         if not same & alike.keys() and all(own.get(name, ("",))[0] == one[0] for own in named):
             alike[name] = one
-    return alike
+    return StatedConstants(alike, differing)
 
 
 def constants_in_name(name: str) -> Stated:

@@ -40,8 +40,8 @@ _NEEDED = {
                      ["# [ground_speed]",
                       '# value = "0.02 m/s +- 1 %"   # a carriage of constant speed']),
 }  # fmt: skip
-#: Uncertainty of what logs state in place of a column.
-_STATED = {"load": "1 %", "ground_speed": "1 %", "slip": "0.01"}
+#: Uncertainty and unit of what logs state in place of a column.
+_STATED = {"load": ("1 %", "N"), "ground_speed": ("1 %", "m/s"), "slip": ("0.01", "1")}
 _HEAD = """\
 # Written by `soilml import --init`. All of it is a guess: look at the lines with
 # CHANGE and NEEDED first, then at the units. Values take a unit and an uncertainty:
@@ -77,7 +77,7 @@ class _Guess:
     def __init__(self, logs: Sequence[Sequence[Recording]]) -> None:
         self.logs = logs
         self.stated = agreed_constants(logs)
-        self.division: Division = divide(logs, self.stated)
+        self.division: Division = divide(logs, self.stated.common)
         self.steady = self.division.runs.each_row
         found = LogMap(
             "map", files=self.division.kinds, time=self.division.time, runs=self.division.runs
@@ -120,12 +120,12 @@ class _Guess:
                 draft = drafts[name][role]
                 left = [key for key in draft.keys if key not in alike[role]]
                 tables.append(draft.only(f"wheels.{name}.{role}", left))
-        tables += [] if self.steady else [self._window_table()]
+        tables += [] if self.steady else self._window_tables()
         return WrittenMap(self._head(), tables, evidence)
 
     def _drafts(self) -> tuple[dict[str, dict[str, Draft]], str]:
         """The channels of each wheel, of "" where there is one, and the evidence for them."""
-        stated, found = self.stated, self.found
+        stated, found = self.stated.common, self.found
         judge = Judge(stated_radius(stated), self._weight(), found.others, self.usable,
                       self.reasons, not self.steady)  # fmt: skip
         explained = []
@@ -151,7 +151,7 @@ class _Guess:
 
     def _weight(self) -> tuple[float, float] | None:
         """Least and largest weight on each wheel by the stated mass, N; None without one."""
-        stated = self.stated
+        stated = self.stated.common
         if "mass" not in stated:
             return None
         count = int(stated.get("wheels", (str(max(1, len(self.found.wheels))), ""))[0])
@@ -179,7 +179,7 @@ class _Guess:
 
     def _wheel_table(self, drafts: Mapping[str, Draft]) -> WrittenTable:
         """[wheel]: the radius that the logs state, or a line that asks for it."""
-        wheel, stated = WrittenTable("wheel"), self.stated
+        wheel, stated = WrittenTable("wheel"), self.stated.common
         if key := next((key for key in ("radius", "diameter") if key in stated), ""):
             value, line = stated[key]
             asked = Marked(f"stated in the {line}") if "CHANGE" in line else ""
@@ -201,8 +201,8 @@ class _Guess:
         wheel.after.append(Marked(line) if needed else line)
         return wheel
 
-    def _window_table(self) -> WrittenTable:
-        """[windows], with shorter windows for short runs."""
+    def _window_tables(self) -> list[WrittenTable]:
+        """[windows], with shorter windows for short runs, and an example of [[leave_out]]."""
         lengths = sorted(times[-1] - times[0] for run in self.runs for times in run.times)
         middle = lengths[len(lengths) // 2] if lengths else 0.0
         shortest = min(_USUAL, float(f"{max(_SHARE * middle, 0.05):.1g}"))
@@ -210,11 +210,17 @@ class _Guess:
         table.put("shortest", f"{shortest:g} s")
         table.put("settle", f"{min(0.5, shortest / 4.0):g} s", "left out after each change")
         table.put("sensitivity", 1, "2 finds smaller changes, 0.5 only larger ones")
-        return table
+        example = [
+            "# [[leave_out]]  # a stretch that somebody disturbed",
+            f'# run = "{self.runs[0].name}"',
+            "# from = 12.0  # s",
+            '# why = "the carriage was pulled"',
+        ]
+        return [table, WrittenTable(before=example)]
 
     def _absent_load(self) -> WrittenTable:
         """What stands for a load that no column has: what logs say, or the mass."""
-        common = self.stated
+        common = self.stated.common
         if "mass" not in common and (said := self._said("load")):
             return said
         count, why = max(1, len(self.found.wheels), len(self.division.labels)), ""
@@ -261,12 +267,23 @@ class _Guess:
         return None
 
     def _said(self, role: str) -> WrittenTable | None:
-        """The table of a role that the lines before the headers of all logs state alike."""
-        std = _STATED[role]
-        if role in self.stated:
-            value, line = self.stated[role]
+        """The table of a role that the lines before the headers state, of all logs or of each."""
+        std, unit = _STATED[role]
+        if role in self.stated.common:
+            value, line = self.stated.common[role]
             why = f"stated in the log: {line[:60]}"
             return WrittenTable(role, {"value": f"{value} +- {std}"}, {"value": why})
+        if role in self.stated.of_each:
+            pattern, own, values = self.stated.of_each[role]
+            if role == "slip" and any(float(value.split()[0]) > 1.0 for value in values):
+                unit = "%"
+            table = WrittenTable(role)
+            table.put("head", pattern, f"the logs state {', '.join(values[:4])}")
+            table.put("unit", own or unit)
+            if role == "slip":
+                why = Marked("CHANGE: how far the slip may be from what was set")
+                table.put("noise", 0.01, why)
+            return table
         return None
 
     def _perhaps(self, role: str) -> list[str]:
