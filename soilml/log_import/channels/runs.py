@@ -23,6 +23,8 @@ from soilml.remarks import Remark
 #: A recording, and the kind of its file where a run has several kinds.
 Member = tuple[Recording, FileKind | None]
 _WORDS = re.compile(r"[^A-Za-z0-9.]+|(?<=[a-z0-9])(?=[A-Z])")
+#: Fewest different seconds, and share of the seconds that must have several lines.
+_FEWEST, _SEVERAL = 5, 0.8
 
 
 @dataclass(frozen=True)
@@ -203,8 +205,12 @@ def _with_times(name: str, members: list[Member], log_map: LogMap) -> Run:
         clock = _clock(recording, log_map, kind)
         if clock is None:
             continue
+        spread = spread_over_seconds(clock)
+        if spread is not clock:
+            text = "the clock shows whole seconds: lines of one second are spread over it"
+            notes.append(Remark("whole-seconds", text, severity="note"))
         # samples whose time is above that of all before
-        filled = np.where(np.isfinite(clock), clock, -np.inf)
+        filled = np.where(np.isfinite(spread), spread, -np.inf)
         good = filled > np.maximum.accumulate(np.concatenate([[-np.inf], filled[:-1]]))
         if not good.any():
             continue
@@ -212,7 +218,7 @@ def _with_times(name: str, members: list[Member], log_map: LogMap) -> Run:
             text = f"{int(np.sum(~good))} samples go back in time or have none, and are left out"
             notes.append(Remark("times-not-increasing", text))
             recording = recording.rows(good)
-        clock, same = clock[good], kind is None or kind.clock == "same"
+        clock, same = spread[good], kind is None or kind.clock == "same"
         recordings.append(recording)
         clocks.append((clock - (0.0 if same else clock[0]) + (kind.delay if kind else 0.0), same))
         notes += recording.notes
@@ -290,3 +296,26 @@ def _divided(
         whole, kind = part.pop(at)
         found.append((label, [(whole.rows(every == label), kind), *part]))
     return found
+
+
+def spread_over_seconds(clock: Floats) -> Floats:
+    """Time (n,) in s with the lines of each second evenly over it; `clock` itself where it has
+    fractions, or one line a second.
+
+    The first second may have begun before the log, and the last one ends after it: these have the
+    step of the others.
+    """
+    known = np.flatnonzero(np.isfinite(clock))
+    own = clock[known]
+    if own.size == 0 or np.any(own != np.round(own)) or np.any(np.diff(own) < 0.0):
+        return clock
+    seconds, first, count = np.unique(own, return_index=True, return_counts=True)
+    if seconds.size < _FEWEST or np.mean(count[1:-1] > 1) < _SEVERAL:
+        return clock
+    lines = count.astype(np.float64)
+    lines[[0, -1]] = np.maximum(lines[[0, -1]], np.median(count[1:-1]))
+    late = np.where(np.arange(seconds.size) == 0, lines - count, 0.0)
+    place = np.arange(own.size) - np.repeat(first - late, count)
+    spread = clock.copy()
+    spread[known] = own + place / np.repeat(lines, count)
+    return spread

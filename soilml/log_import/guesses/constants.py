@@ -44,6 +44,14 @@ _STATED = {
 _WHEELS = re.compile(
     r"\b([0-9]{1,2})[ -]?wheel(?:s|ed)\b|\bwheels\s*[:=,;]\s*([0-9]{1,2})\b", re.IGNORECASE
 )
+#: Numbers in names of files: role, pattern and unit.
+_IN_NAMES = (
+    ("load", r"(?<![a-z])(?:load|w|fz|fn|n)[_=-]?(\d+(?:[.p]\d+)?)n?(?![a-z0-9])", "N"),
+    ("load", r"(?<![a-z0-9.])(\d+(?:\.\d+)?)n(?![a-z0-9])", "N"),
+    ("load", r"(?<![a-z0-9.])(?:load|weight|w|m|fz|fn)?[_=-]?(\d+(?:\.\d+)?)kg(?![a-z0-9])", "kgf"),
+    ("slip", r"(?<![a-z])(?:slip|s)[_=-]?(\d\d?(?:\.\d+)?)(?:pct|percent|%)?(?![0-9a-z])", "%"),
+    ("slip", r"(?<![a-z])(?:slip|s)[_=-]?(-?0\.\d+)(?![0-9])", "1"),
+)
 #: Constants in names of files: name, and pattern of the number and its unit.
 _CONSTANTS_IN_NAMES = tuple(
     (constant, rf"(?<![a-z]){words}[_= -]?(\d+(?:[.p]\d+)?)[_ ]?{unit}(?![a-z0-9])")
@@ -149,3 +157,12 @@ def constants_in_name(name: str) -> Stated:
         if unit or constant == "gear_ratio":
             found[constant] = (f"{number} {unit}".strip(), said)
     return found
+
+
+def number_in_names(role: str, names: Sequence[str]) -> tuple[str, str, list[float]] | None:
+    """A pattern that finds a number for a role in all names of runs, its unit and the numbers."""
+    for kind, pattern, unit in _IN_NAMES:
+        matches = [re.search(pattern, name, re.IGNORECASE | re.ASCII) for name in names]
+        if kind == role and all(matches):
+            return pattern, unit, [float(m[1].replace("p", ".")) for m in matches if m]
+    return None

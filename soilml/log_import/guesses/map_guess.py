@@ -13,7 +13,7 @@ from soilml.log_import.guesses.assignment import assign, axle_of, by_behaviour
 from soilml.log_import.guesses.channel_drafts import add_errors, draft_channels, is_error
 from soilml.log_import.guesses.clocks_and_runs import Division, divide, refuse_a_table_of_runs
 from soilml.log_import.guesses.columns import candidates_of, describe
-from soilml.log_import.guesses.constants import agreed_constants, stated_radius
+from soilml.log_import.guesses.constants import agreed_constants, number_in_names, stated_radius
 from soilml.log_import.guesses.draft import Draft, driving_means, implied_radius, inputs_of
 from soilml.log_import.guesses.evidence import Judge
 from soilml.log_import.guesses.role_words import CLEAR, USUAL, is_size, says
@@ -83,6 +83,7 @@ class _Guess:
             "map", files=self.division.kinds, time=self.division.time, runs=self.division.runs
         )
         self.runs = runs_of(logs, replace(found, runs=replace(found.runs, each_row=False)))
+        self.run_names = [run.name for run in self.runs]
         self.run = self.runs[0]
         clocks = {found.time.column, *(kind.time_column for kind in found.files)}
         columns = candidates_of(self.run.recordings, self.steady)
@@ -219,9 +220,9 @@ class _Guess:
         return [table, WrittenTable(before=example)]
 
     def _absent_load(self) -> WrittenTable:
-        """What stands for a load that no column has: what logs say, or the mass."""
+        """What stands for a load that no column has: what logs or names say, or the mass."""
         common = self.stated.common
-        if "mass" not in common and (said := self._said("load")):
+        if said := self._said("load", logs="mass" not in common):
             return said
         count, why = max(1, len(self.found.wheels), len(self.division.labels)), ""
         if count == 1:
@@ -237,8 +238,7 @@ class _Guess:
             return table
         wheels = f"# {key_line('wheels', count, why)}"
         table.after = [
-            Marked("# [vehicle]                   # NEEDED, or [load] value = '60 N +- 1 N', or"),
-            "# # [load] file_name = 'load_(\\d+)N' where the names of the logs have it",
+            Marked("# [vehicle]                   # NEEDED, or [load] value = '60 N +- 1 N'"),
             '# mass = "6.1 kg +- 0.1 kg"   # all that stands on the wheels',
             Marked(wheels) if isinstance(why, Marked) else wheels,
         ]
@@ -266,14 +266,16 @@ class _Guess:
             return WrittenTable(before=[line, f"# column = {names[0]}"])
         return None
 
-    def _said(self, role: str) -> WrittenTable | None:
-        """The table of a role that the lines before the headers state, of all logs or of each."""
+    def _said(self, role: str, logs: bool = True) -> WrittenTable | None:
+        """The table of a role that the lines before the headers state, of all logs or of each, or
+        whose number stands in the names of all runs.
+        """
         std, unit = _STATED[role]
-        if role in self.stated.common:
+        if logs and role in self.stated.common:
             value, line = self.stated.common[role]
             why = f"stated in the log: {line[:60]}"
             return WrittenTable(role, {"value": f"{value} +- {std}"}, {"value": why})
-        if role in self.stated.of_each:
+        if logs and role in self.stated.of_each:
             pattern, own, values = self.stated.of_each[role]
             if role == "slip" and any(float(value.split()[0]) > 1.0 for value in values):
                 unit = "%"
@@ -284,7 +286,11 @@ class _Guess:
                 why = Marked("CHANGE: how far the slip may be from what was set")
                 table.put("noise", 0.01, why)
             return table
-        return None
+        if (in_name := number_in_names(role, self.run_names)) is None:
+            return None
+        pattern, unit, numbers = in_name
+        why = f"the names say {', '.join(f'{n:g}' for n in numbers[:4])}"
+        return WrittenTable(role, {"file_name": pattern, "unit": unit}, {"file_name": why})
 
     def _perhaps(self, role: str) -> list[str]:
         """Columns of the unit of a role that nothing uses and that vary: one may be the role."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import re
 from collections.abc import Sequence
@@ -67,4 +68,10 @@ def _lines(file: Path) -> list[str]:
     except (OSError, SoilmlError):
         return []
     lines = [line for line in text.splitlines() if line.strip()]
+    if file.suffix.lower() == ".csv" and len(lines) == 2:
+        try:
+            names, values = csv.reader(lines)
+        except (csv.Error, ValueError):
+            return []
+        return [f"{a.strip()}: {b.strip()}" for a, b in zip(names, values, strict=False)]
     return [_MARKS.sub("", line).strip() for line in lines[:_MOST_LINES]]

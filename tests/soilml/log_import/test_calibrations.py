@@ -8,7 +8,7 @@ from foreign_rigs import RADIUS, RADIUS_EDIT, drive, law, noisy, table
 from simulated_rig import imported
 
 from soilml.errors import InputError
-from soilml.log_import import import_log
+from soilml.log_import import import_log, init_map
 from soilml.log_import.guesses.constants import stated_constants
 
 SLIPS = (0.1, 0.25, 0.45)
@@ -101,6 +101,7 @@ def test_stated_numbers_are_in_plain_digits(tmp_path):
     assert not stated_constants([f"gear ratio: {'9' * 400}"])
     file = tmp_path / "load_\uff16\uff10N.csv"
     file.write_text("v,w,M\n" + "0.1,1,2\n" * 30, "utf-8")
+    assert "file_name" not in init_map(file)
     given = {"time": {"rate": "10 Hz"}, "wheel": {"radius": RADIUS}}
     given |= {"wheel_speed": {"column": "w"}, "ground_speed": {"column": "v"}}
     given["load"] = {"file_name": r"load_(\d+)N"}

@@ -12,7 +12,7 @@ from soilml.log_import.readers import read_log
 from soilml.log_import.readers.side_files import side_lines
 
 
-@pytest.mark.parametrize("kind", ["json", "txt", "own"])
+@pytest.mark.parametrize("kind", ["json", "csv", "txt", "own"])
 def test_files_beside_a_log_state_constants(kind, tmp_path):
     d = drive(np.random.default_rng(3), (0.1, 0.4), [60] * 2)
     log = tmp_path / "log1.csv"
@@ -21,6 +21,8 @@ def test_files_beside_a_log_state_constants(kind, tmp_path):
     content = {"wheel_radius_mm": 130, "gear_ratio": 1}
     if kind == "json":
         (tmp_path / "run_parameters.json").write_text(json.dumps(content, indent=2))
+    elif kind == "csv":
+        (tmp_path / "RUN_PARAMETERS.csv").write_text("wheel_radius_mm,gear_ratio\n130,1\n")
     else:
         name = "RUN_PARAMETERS" if kind == "txt" else "log1_meta"
         (tmp_path / f"{name}.txt").write_text("wheel_radius_mm = 130\n")
