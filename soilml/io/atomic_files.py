@@ -1,11 +1,16 @@
-"""Output files, written atomically as sets, also where the process is stopped.
+"""Output files, written atomically as sets, also where the process is stopped or killed.
 
-A process that is killed may leave temporary files `.NAME.RANDOM.part`, and no half of an output.
+While files are written and replaced, a journal `.NAME.RANDOM.journal` lies beside the first of
+them. It names all, and it is locked, so that another process can tell whether its writer is alive.
+After a process was killed, the next one that writes the same files reads the journal: temporary
+files that were complete take their places, incomplete ones are removed.
 """
 
 from __future__ import annotations
 
 import errno
+import glob
+import json
 import os
 import signal
 import stat
@@ -13,31 +18,133 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from soilml.errors import InputError
 from soilml.io.cell_text import one_line
 
+try:
+    import fcntl
+except ImportError:  # not on every system: nothing is cleared there
+    fcntl = None  # type: ignore[assignment]
+
 replaced: list[str] = []  # Names of outputs that this process has replaced, in order
+#: Last line of a journal whose files are all complete.
+_COMPLETE = "complete\n"
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
-_temporary: set[Path] = set()  # Temporary files of this process
+#: Swaps of this process by their journals, whose locks it would not notice.
+_own: dict[Path, Swap] = {}
+
+
+class Swap:
+    """Temporary files `parts` for the files `targets`, and files to remove with the exchange."""
+
+    def __init__(self, targets: Sequence[Path], remove: Sequence[Path] = ()) -> None:
+        token = os.urandom(4).hex()
+        self.targets, self.remove = list(targets), list(remove)
+        self.parts = [t.parent / f".{t.name[:40]}.{token}.part" for t in self.targets]
+        first = self.targets[0]
+        self._journal = first.parent / f".{first.name[:40]}.{token}.journal"
+        self._opened: IO[str] | None = None
+
+    def __enter__(self) -> Swap:
+        _own[self._journal] = self
+        self._opened = self._journal.open("x", encoding="utf-8")
+        if fcntl is not None:
+            with suppress(OSError):  # a file system without locks
+                fcntl.lockf(self._opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        moves = [[str(p), str(t)] for p, t in zip(self.parts, self.targets, strict=True)]
+        try:
+            remove = [str(path) for path in self.remove]
+            self._write(json.dumps({"moves": moves, "remove": remove}) + "\n")
+        except BaseException:  # a disk without room for a line
+            self.clear()
+            raise
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Remove what is left of the temporary files, and the journal."""
+        try:
+            for part in self.parts:
+                part.unlink(missing_ok=True)
+        finally:
+            self._journal.unlink(missing_ok=True)
+            if self._opened is not None:
+                with suppress(OSError):
+                    self._opened.close()
+            _own.pop(self._journal, None)
+
+    def replace_all(self, names: str) -> None:
+        """Put every temporary file in its place; a signal to stop waits, and then says so."""
+        with _signals_after(f"interrupted; complete before that: {names}"):
+            self._write(_COMPLETE)
+            _exchange(list(zip(self.parts, self.targets, strict=True)), self.remove)
+            if not any(target.suffix == ".part" for target in self.targets):
+                replaced.append(names)
+
+    def _write(self, text: str) -> None:
+        assert self._opened is not None
+        self._opened.write(text)
+        self._opened.flush()
+        os.fsync(self._opened.fileno())
 
 
 def is_writing() -> bool:
     """Whether this process has temporary files."""
-    return bool(_temporary)
+    return bool(_own)
 
 
 def clear_interrupted() -> None:
-    """Remove what this process left where a signal arrived as a set of files began or ended."""
-    _remove(list(_temporary))
-
-
-def _remove(parts: Iterable[Path]) -> None:
-    for part in parts:
+    """Clear what this process left where a signal arrived as a swap began or ended."""
+    for swap in list(_own.values()):
         with suppress(OSError):
+            swap.clear()
+
+
+def finish_interrupted(targets: Sequence[Path]) -> None:
+    """Finish or clear what killed processes left of writing these files."""
+    if fcntl is None:
+        return
+    for target in targets:
+        pattern = f".{glob.escape(target.name[:40])}.{'[0-9a-f]' * 8}.journal"
+        for journal in target.parent.glob(pattern):
+            if journal not in _own:
+                with suppress(OSError, ValueError, KeyError, TypeError):
+                    _finish(journal, {target.parent for target in targets})
+
+
+def _finish(journal: Path, folders: set[Path]) -> None:
+    """Finish or clear what one journal names, if that lies in these folders."""
+    with journal.open("r+", encoding="utf-8") as opened:
+        fcntl.lockf(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)  # OSError where its writer is alive
+        first, *rest = opened.readlines() or [""]
+        content: dict[str, Any] = json.loads(first) if first else {"moves": [], "remove": []}
+        moves = [(Path(part), Path(target)) for part, target in content["moves"]]
+        remove = [Path(path) for path in content["remove"]]
+        if any(path.parent not in folders for path in remove) or not all(
+            part.parent == target.parent
+            and target.parent in folders
+            and part.name.startswith(f".{target.name[:40]}.")
+            and part.suffix == ".part"
+            for part, target in moves
+        ):
+            return  # no journal of ours
+        if rest == [_COMPLETE]:
+            _exchange([(part, target) for part, target in moves if part.exists()], remove)
+        for part, _ in moves:
+            finish_interrupted([part])  # a function that writes a file wrote this one
             part.unlink(missing_ok=True)
-        _temporary.discard(part)
+        journal.unlink(missing_ok=True)
+
+
+def _exchange(moves: Sequence[tuple[Path, Path]], remove: Sequence[Path]) -> None:
+    for part, target in moves:
+        part.replace(target)
+    for path in remove:
+        path.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -129,37 +236,33 @@ def atomic_outputs(
     """Temporary paths that are renamed to `paths` when the block succeeds, and deleted otherwise.
 
     All targets are checked before the block, and none is replaced before all files are written.
-    Then all are replaced: a signal waits until they are. Files of an earlier set that the new one
+    Then all are replaced: a signal waits until they are, and what a killed process left is finished
+    or cleared by the next one that writes the same files. Files of an earlier set that the new one
     does not have are in `remove`. A temporary file lies in the folder of its
     target as `.NAME.RANDOM.part`, so that two processes do not share one. A file that is replaced
     keeps its permissions.
 
     Raises `InputError` as `check_writable` does, and where the disk is full.
     """
-    targets, token = [check_writable(path) for path in paths], os.urandom(4).hex()
+    if not paths:
+        yield []
+        return
+    targets = [check_writable(path) for path in paths]
     names = ", ".join(str(path) for path in paths)
-    parts = [t.parent / f".{t.name[:40]}.{token}.part" for t in targets]
     try:
-        _temporary.update(parts)
-        yield parts
-        for part, target in zip(parts, targets, strict=True):
-            with part.open("rb+") as written:
-                if (kind := _kind(target)) is not None:
-                    os.fchmod(written.fileno(), stat.S_IMODE(kind))
-                os.fsync(written.fileno())
-        for path in paths:
-            check_writable(path)  # it may have changed since the first check
-        with _signals_after(f"interrupted; complete before that: {names}"):
-            for part, target in zip(parts, targets, strict=True):
-                part.replace(target)
-            for path in remove:
-                Path(os.path.realpath(path)).unlink(missing_ok=True)
-            if paths and not any(target.suffix == ".part" for target in targets):
-                replaced.append(names)
+        finish_interrupted(targets)
+        with Swap(targets, [Path(os.path.realpath(path)) for path in remove]) as swap:
+            yield swap.parts
+            for part, target in zip(swap.parts, targets, strict=True):
+                with part.open("rb+") as written:
+                    if (kind := _kind(target)) is not None:
+                        os.fchmod(written.fileno(), stat.S_IMODE(kind))
+                    os.fsync(written.fileno())
+            for path in paths:
+                check_writable(path)  # it may have changed since the first check
+            swap.replace_all(names)
     except OSError as error:
         raise InputError(f"{names} cannot be written: {_why(error)}") from error
-    finally:
-        _remove(parts)
 
 
 @contextmanager

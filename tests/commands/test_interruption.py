@@ -9,7 +9,7 @@ import pytest
 from conftest import MODEL
 
 from soilml.cli import main
-from soilml.io import atomic_files
+from soilml.io.atomic_files import Swap
 
 #: Runs the command line; SIGINT arrives when the named module is imported.
 INTERRUPTED = """
@@ -54,20 +54,27 @@ def test_ctrl_c_in_an_import(tmp_path, small_model, module, words):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["model.toml", "runs.csv"]
 
 
-def test_a_signal_as_a_set_of_files_ends_leaves_nothing(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("where", ["__enter__", "__exit__"])
+def test_a_signal_as_a_set_of_files_begins_or_ends_leaves_nothing(
+    tmp_path, monkeypatch, capsys, where
+):
+    """Python calls neither method to the end where a signal arrives in it."""
     (tmp_path / "model.toml").write_text(MODEL)
-    remove, signals = atomic_files._remove, [signal.SIGINT]
+    done = getattr(Swap, where)
 
-    def interrupted(parts):
-        if signals:
-            signal.raise_signal(signals.pop())
-        remove(parts)
+    def interrupted(swap, *error):
+        if where == "__enter__":
+            done(swap)
+        signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(atomic_files, "_remove", interrupted)
+    monkeypatch.setattr(Swap, where, interrupted)
     monkeypatch.chdir(tmp_path)
     assert (
         main(["simulate", "model.toml", "--slip", "0.1", "--load", "60", "--out", "s.csv"]) == 130
     )
     said = capsys.readouterr().err
-    assert said.startswith("soilml: interrupted; complete before that: s.csv")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["model.toml", "s.csv"]
+    assert said.startswith("soilml: interrupted; ") and said.count("\n") == 1
+    complete = where == "__exit__"
+    assert ("complete before that: s.csv" in said) == complete
+    files = ["model.toml", "s.csv"] if complete else ["model.toml"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == files

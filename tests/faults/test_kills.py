@@ -1,7 +1,7 @@
 """Commands that are killed at random moments: outputs are whole, and a rerun makes them anew.
 
 After a kill every output that is there is whole; after the rerun the outputs are those of an
-undisturbed run, bit for bit. `make faults FAULT_KILLS=30` kills
+undisturbed run, bit for bit, and nothing else lies beside them. `make faults FAULT_KILLS=30` kills
 each command so often.
 """
 
@@ -69,11 +69,6 @@ def digests(folder):
     }
 
 
-def visible(files):
-    """Outputs without temporary files, which a killed process leaves."""
-    return {name: own for name, own in files.items() if not Path(name).name.startswith(".")}
-
-
 def completed(folder, words):
     """Run to the end; the seconds that it took."""
     begun = time.monotonic()
@@ -131,9 +126,9 @@ def test_a_rerun_after_a_kill_is_as_if_nothing_had_happened(folder, command, sub
         with subtests.test(f"{number.name} after {delay:.2f} s"):
             assert not killed(folder, words, delay, number)
             left = digests(out)
-            whole = visible(left)
+            whole = {name: own for name, own in left.items() if not Path(name).name.startswith(".")}
             assert whole.items() <= right.items()
             assert number == signal.SIGKILL or whole == left
             time.sleep(0.2 if number == signal.SIGKILL else 0.0)  # workers end with their parent
             completed(folder, words)
-            assert visible(digests(out)) == right
+            assert digests(out) == right
