@@ -42,7 +42,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/report/column_figure.py": {"matplotlib"},
     "soilml/gap/pictures.py": {"matplotlib"},
     "soilml/log_import/import_report.py": {"matplotlib"},
-    "soilml/log_import/readers/bags.py": {"rosbags", "mcap"},
+    "soilml/log_import/readers/bags.py": {"rosbags", "mcap", "mcap_protobuf"},
     "soilml/log_import/readers/matlab.py": {"scipy", "h5py"},
     "soilml/log_import/readers/parquet_log.py": {"pyarrow"},
     "soilml/log_import/units.py": {"pint"},

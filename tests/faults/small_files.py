@@ -252,6 +252,11 @@ def unallocated_hdf5():
     return content.getvalue()
 
 
+def widening_json():
+    """Lines of which each has a key of its own."""
+    return "\n".join(f'{{"k{i}": 1, "t": {i}}}' for i in range(60_000)).encode()
+
+
 def claimed_chunk_mcap():
     """A chunk of MCAP that states a size of 3 TB."""
     from zstandard import ZstdCompressor

@@ -26,6 +26,7 @@ CASES = [
     ("rows.parquet", files.constant_parquet, ESTIMATE, "more than 2000000 rows to estimate"),
     ("wide.csv", lambda: files.many_columns_csv(200_000), IMPORT, "more than 2000 columns"),
     ("header.csv", lambda: files.many_columns_csv(100_000), ESTIMATE, "more than 2000 columns"),
+    ("wide.jsonl", files.widening_json, IMPORT, "more than 2000 columns"),
     ("chunk.mcap", files.claimed_chunk_mcap, IMPORT, "bytes in a compressed block"),
     ("chunk.bag", files.claimed_chunk_bag, IMPORT, "bytes in a compressed block"),
 ]  # fmt: skip

@@ -28,6 +28,9 @@ _READERS = {
     ".mat": ("matlab", "read_matlab"),
     ".h5": ("matlab", "read_matlab"),
     ".hdf5": ("matlab", "read_matlab"),
+    ".json": ("json_lines", "read_json_log"),
+    ".jsonl": ("json_lines", "read_json_log"),
+    ".ndjson": ("json_lines", "read_json_log"),
     ".mcap": ("bags", "read_bag"),
     ".bag": ("bags", "read_bag"),
 }
@@ -36,7 +39,6 @@ _LONG = ("read_delimited_text", "read_bag")  # Readers that show their progress
 _OTHERS = {
     **dict.fromkeys((".xls", ".xlsb", ".ods"), "is a spreadsheet; save it as .xlsx"),
     **dict.fromkeys((".gz", ".zip", ".bz2", ".xz", ".7z", ".tar"), "is packed; unpack it"),
-    **dict.fromkeys((".json", ".jsonl", ".ndjson"), "is JSON; save it as CSV or Parquet"),
     ".db3": "is part of a ROS 2 bag; give its folder",
     ".tdms": "is a binary file of LabVIEW; save it as text (.lvm or CSV)",
 }

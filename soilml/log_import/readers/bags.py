@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 
 from soilml.errors import InputError, MissingLibraryError
 from soilml.io.bounds import BLOCK_BYTES
-from soilml.log_import.readers.message_fields import TopicColumns, thin_largest
+from soilml.log_import.readers.message_fields import TopicColumns, protobuf_fields, thin_largest
 from soilml.log_import.recording import Recording
 from soilml.optional_imports import need
 from soilml.remarks import Remark, texts
@@ -89,7 +89,9 @@ def _mcap_messages(path: Path, notes: list[Remark]) -> Iterator[tuple[str, float
                 decoders[channel.id] = _decoder(schema, channel.message_encoding)
                 if decoders[channel.id] is None:
                     kind = channel.message_encoding or "unknown"
-                    text = f"{channel.topic}: encoding {kind} is not read (json, cdr, ros1)"
+                    text = (
+                        f"{channel.topic}: encoding {kind} is not read (json, protobuf, cdr, ros1)"
+                    )
                     notes.append(Remark("unknown-encoding", text, (channel.topic,)))
             decode = decoders[channel.id]
             if decode is not None:
@@ -100,6 +102,12 @@ def _mcap_messages(path: Path, notes: list[Remark]) -> Iterator[tuple[str, float
 def _decoder(schema: Any, encoding: str) -> Callable[[bytes], Any] | None:
     if encoding == "json":
         return json.loads
+    if encoding == "protobuf" and schema is not None:
+        need("mcap_protobuf", "import", "logs")
+        from mcap_protobuf.decoder import DecoderFactory
+
+        parse_message = DecoderFactory().decoder_for(encoding, schema)
+        return None if parse_message is None else lambda data: protobuf_fields(parse_message(data))
     if schema is None or encoding not in ("cdr", "ros1"):
         return None
     from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore

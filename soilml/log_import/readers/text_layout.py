@@ -42,6 +42,15 @@ _UNITS_FOLLOW = re.compile(r"^(units?|einheit(en)?|unidades|unités?)\s*[:=]\s*"
 _SEPARATORS = (";", "\t", ",", "|")
 #: Lines looked at, and how many of them must follow each other like samples.
 _LOOKED, _IN_A_ROW = 400, 3
+#: Files that a program writes without a header: name of the file -> columns with their units.
+#: DBP.dat is of the drawbar-pull rig in Chrono::Vehicle's co-simulation (OutputData of
+#: ChVehicleCosimWheeledMBSNode.cpp), whose slip is 1 - v/(r omega).
+_HEADERS: dict[str, tuple[tuple[str, str], ...]] = {
+    "DBP.dat": (
+        ("time", "s"), ("lin_vel", "m/s"), ("ang_vel", "rad/s"), ("slip", "1"),
+        ("slip_filtered", "1"), ("DBP", "N"), ("DBP_filtered", ""),
+    ),
+}  # fmt: skip
 
 
 def decode_text(data: bytes, file: Path) -> tuple[str, str]:
@@ -55,7 +64,7 @@ def decode_text(data: bytes, file: Path) -> tuple[str, str]:
     if b"\0" in data[:4096]:
         raise InputError(
             f"{file} is not a text file, and its name has no ending of another format; known are "
-            ".csv, .txt, .tsv, .dat, .parquet, .mat, .h5, .mcap and .bag"
+            ".csv, .txt, .tsv, .dat, .json, .parquet, .mat, .h5, .mcap and .bag"
         )
     # letters with accents stand alone among ASCII, Chinese characters are two bytes each
     runs = [len(run) for run in _HIGH.findall(data)]
@@ -104,6 +113,9 @@ def find_layout(file: Path, lines: Sequence[str]) -> TextLayout | None:
     best = max(found, key=lambda f: (f[3] * min(f[4], 3), f[4], _numbers(head[f[2] :], f[0], f[1])))
     separator, comma, first, _, width = best
     names, units, header = _header(head[:first], separator, width)
+    known = _HEADERS.get(file.name, ())
+    if header == first and len(known) == width:  # a file without a header
+        names, units = zip(*known, strict=True)
     about = tuple(plain for line in head[:header] if (plain := _uncommented(line)))
     return _with_labview_head(TextLayout(separator, comma, names, units, first, about))
 

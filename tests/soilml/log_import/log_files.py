@@ -73,6 +73,45 @@ def write_mcap_json(path, drive):
     return path
 
 
+def write_mcap_protobuf(path, drive):
+    """One topic with a time of its own, a nested message and an array; zeros are left out by
+    protobuf, so that the wheel at rest is written as nothing."""
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+    from mcap_protobuf.writer import Writer
+
+    kinds = {"f": descriptor_pb2.FieldDescriptorProto.TYPE_DOUBLE,
+             "m": descriptor_pb2.FieldDescriptorProto.TYPE_MESSAGE}  # fmt: skip
+    file = descriptor_pb2.FileDescriptorProto(name="rig.proto", package="rig", syntax="proto3")
+    file.dependency.append("google/protobuf/timestamp.proto")
+    for name, fields in {
+        "Force": [("z", "f", "")],
+        "State": [("stamp", "m", ".google.protobuf.Timestamp"), ("wheel_speed", "f", ""),
+                  ("ground_speed", "f", ""), ("torque", "f", ""), ("force", "m", ".rig.Force"),
+                  ("temperatures", "f", "")],
+    }.items():  # fmt: skip
+        message = file.message_type.add(name=name)
+        for number, (field, kind, type_name) in enumerate(fields, 1):
+            added = message.field.add(name=field, number=number, type=kinds[kind], label=1)
+            if type_name:
+                added.type_name = type_name
+            if field == "temperatures":
+                added.label = 3
+    pool = descriptor_pool.DescriptorPool()
+    pool.AddSerializedFile(timestamp_pb2.DESCRIPTOR.serialized_pb)
+    pool.Add(file)
+    state = message_factory.GetMessageClass(pool.FindMessageTypeByName("rig.State"))
+    with path.open("wb") as opened, Writer(opened) as writer:
+        for i, t in enumerate(drive.time):
+            message = state(wheel_speed=drive.rim[i] / RADIUS, ground_speed=drive.ground[i],
+                            torque=drive.torque[i], temperatures=[20.0, 21.0])  # fmt: skip
+            message.force.z = drive.load[i]
+            message.stamp.seconds, message.stamp.nanos = int(1.7e9 + t), int(1e9 * (t % 1.0))
+            # the logger writes late and unevenly; the stamp is when the sensors were read
+            late = int(1e9 * (1.7e9 + t + 0.05 * (i % 7)))
+            writer.write_message("/rig", message, log_time=late, publish_time=late)
+    return path
+
+
 def write_bag(path, drive, version):
     """Joint states, odometry and a wrench, as ROS 1 or ROS 2 writes them; load at half the rate."""
     from rosbags.rosbag1 import Writer as Writer1
@@ -147,6 +186,7 @@ FORMATS = SimpleNamespace(
     matlab=(".mat", write_matlab),
     matlab_73=(".mat", write_matlab_73),
     mcap=(".mcap", write_mcap_json),
+    mcap_protobuf=(".mcap", write_mcap_protobuf),
     ros1=(".bag", lambda path, drive: write_bag(path, drive, 1)),
     ros2=("", lambda path, drive: write_bag(path, drive, 2)),
 )

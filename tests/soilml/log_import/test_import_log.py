@@ -85,7 +85,9 @@ def test_every_format_gives_the_same_rows(name, tmp_path):
     """Read by the map that init_map writes, with the radius filled in and nothing else."""
     if name == "matlab_73":
         pytest.importorskip("h5py")
-    if name in ("mcap", "ros1", "ros2"):
+    if name == "mcap_protobuf":
+        pytest.importorskip("mcap_protobuf")
+    if name in ("mcap", "mcap_protobuf", "ros1", "ros2"):
         pytest.importorskip("rosbags")
         pytest.importorskip("mcap")
     d = drive(np.random.default_rng(22), slips=(0.1, 0.4), seconds=9, rate=25.0)

@@ -1,5 +1,6 @@
 """The map that is written for a log nobody has described, and the traps of real logs."""
 
+import json
 import os
 import re
 import tomllib
@@ -235,21 +236,28 @@ def test_measured_tables_are_looked_at():
             import_log(log, content)
 
 
-def test_a_map_of_any_names_can_be_read(tmp_path):
+@pytest.mark.parametrize("ending", ["csv", "json"])
+def test_a_map_of_any_names_can_be_read(tmp_path, ending):
     """Control characters of names and heads, which TOML does not have in comments or in quotes."""
     d = drive(np.random.default_rng(4), slips=SLIPS, seconds=10)
     values = (d.time, d.rim / RADIUS, d.ground, d.torque, d.load)
     names = ["time_s", "wheel_speed \x1b[31m rad_s", "ground_speed\x7f\u202e_m_s", "torque'\\q_Nm",
              "load\u200b_#N"]  # fmt: skip
-    log = tmp_path / "a\x1b\n.csv"
-    write_csv(log, dict(zip(names, values, strict=True)), head=(f"radius: {RADIUS} m \x07",))
+    log = tmp_path / f"a\x1b\n.{ending}"
+    if ending == "csv":
+        write_csv(log, dict(zip(names, values, strict=True)), head=(f"radius: {RADIUS} m \x07",))
+    else:
+        names[4] = "load\n_N \ud800"
+        log.write_text(json.dumps(dict(zip(names, (list(v) for v in values), strict=True))))
+        names[4] = "load\n_N ?"
     text = init_map(log)
     assert text.isprintable() or {*filter(lambda c: not c.isprintable(), text)} == {"\n"}
     content = tomllib.loads(text)
     roles = ("wheel_speed", "ground_speed", "torque", "load")
     assert [content["time"]["column"], *(content[role]["column"] for role in roles)] == names
-    (tmp_path / "map.toml").write_text(text, encoding="utf-8")
-    assert len(import_log(log, tmp_path / "map.toml").table) == len(SLIPS)
+    if ending == "csv":
+        (tmp_path / "map.toml").write_text(text, encoding="utf-8")
+        assert len(import_log(log, tmp_path / "map.toml").table) == len(SLIPS)
 
 
 def test_a_kind_of_files_whose_word_has_a_dot(tmp_path):
