@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -332,14 +331,12 @@ def walk_table(
     grounds: Mapping[str, LinearGround],
     slips: Sequence[float],
     turns: float = 2.0,
-    **changes: Any,
 ) -> dict[str, Array]:
     """Walk with every combination of foot, legs, ground and commanded slip (NaN: free).
 
-    `grounds` are by name; one that is named by its stiffness has no other name. `changes` are
-    further fields of `WheelLeg`, such as its mass. Returns columns with a row for each walk: what
-    was asked for, `gait_metrics`, and its status. Raises `InputError` for an unknown foot, an
-    invalid wheel-leg, and too many walks.
+    `grounds` are by name; one that is named by its stiffness has no other name. Returns columns
+    with a row for each walk: what was asked for, `gait_metrics`, and its status. Raises
+    `InputError` for an unknown foot, an invalid wheel-leg, and too many walks.
     """
     cases = list(product(feet, legs, grounds, slips))
     if len(cases) > MOST:
@@ -347,7 +344,7 @@ def walk_table(
     foot, count, under, slip = (np.asarray(part) for part in zip(*cases, strict=True))
     stiffness = np.asarray([grounds[name].stiffness for name in under])
     walked = walk(
-        [wheel_leg(foot, legs=count, **changes) for foot, count, _, _ in cases],
+        [wheel_leg(foot, legs=count) for foot, count, _, _ in cases],
         [grounds[name] for name in under],
         slip=slip.astype(float),
         turns=turns,
