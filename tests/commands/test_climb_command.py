@@ -136,7 +136,7 @@ FAULTS = {
     ),
     "a slope beyond grip": (
         lambda r, s: (of_run(r, "slope_rad", "8deg_1", 1.2), s),
-        "run 8deg_1: a slope of 1.2 rad requires",
+        "no single soil within the ranges explains these climbs",
     ),
     "climbs that contradict": (
         lambda r, s: (of_run(r, "slope_rad", "8deg_1", 0.5), s),

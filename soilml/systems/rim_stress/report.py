@@ -96,7 +96,7 @@ class ClimbingReport:
             )
             warnings.append(Remark("still-rising", text))
         steepest = float(quantile_band(self.ability.steepest).upper)
-        least = ZERO_SLIP_SIGMAS * np.hypot(noise.speed_m_s.share, noise.speed_scale)
+        least = ZERO_SLIP_SIGMAS * noise.speed_m_s.share
         climbs = self.data.climbs
         steep = [c.name for c in climbs if c.slope > steepest]
         if steep:
