@@ -141,7 +141,6 @@ def export_soil(
     out: str | os.PathLike[str] | None = None,
     *,
     draws: int = 0,
-    run: str | None = None,
     seed: int = 0,
     words: Sequence[str] = (),
 ) -> SoilExport:
@@ -157,8 +156,6 @@ def export_soil(
         Folder for the files; it is made where it is missing. None: nothing is written.
     draws
         Number of draws of the posterior, or of the priors of a model file, as files of their own.
-    run
-        Which result, where the file has one for each run.
     seed
         Seed of the choice of draws.
     words
@@ -171,7 +168,7 @@ def export_soil(
     Raises
     ------
     InputError
-        For a target or a run that does not exist, for values that the program would misread, and
+        For a target that does not exist, for values that the program would misread, and
         where the source has not as many draws.
 
     Examples
@@ -199,7 +196,7 @@ def export_soil(
     target = TARGETS[to]
     if not 0 <= draws <= MOST_DRAWS:
         raise InputError(f"--draws is {draws}; needed is a whole number from 0 to {MOST_DRAWS}")
-    known = read_source_soil(source, run)
+    known = read_source_soil(source)
     remarks = list(known.remarks)
     for own in target.fixed:
         text = f"{own.name} = {own.value:g} {unit_text(own.unit)} is a default: {own.reason}"

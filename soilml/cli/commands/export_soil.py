@@ -36,7 +36,6 @@ ARGUMENTS = (
     ("--to TARGET", "chrono or gazebo", REQUIRED),
     ("--out FOLDER", "folder for the files", REQUIRED),
     ("--draws N (0)", "number of soils drawn from the posterior", whole_number_from(0)),
-    ("--group NAME", "which result of `identify --by`"),
     "seed",
 )
 
@@ -59,7 +58,6 @@ def run(args: argparse.Namespace) -> int:
         args.to,
         args.out,
         draws=args.draws,
-        run=args.group,
         seed=args.seed,
         words=words,
     )

@@ -171,7 +171,7 @@ def identify_ground(
         )
     ]
     assumed = {name: ranges[name] for name in free if name not in prior}
-    warnings = _warnings(fit, noise_scale, slopes, assumed) + unit_remarks(np.asarray(scales))
+    warnings = _warnings(fit, noise_scale, assumed) + unit_remarks(np.asarray(scales))
     return GroundEstimate(
         fit=replace(fit, warnings=tuple(warnings)),
         samples=samples,
@@ -214,9 +214,7 @@ def _refuse_contradiction(
         )
 
 
-def _warnings(
-    fit: Fit, noise_scale: float, slopes: int, assumed: Mapping[str, Prior]
-) -> list[Remark]:
+def _warnings(fit: Fit, noise_scale: float, assumed: Mapping[str, Prior]) -> list[Remark]:
     """What limits the estimate."""
     found = [
         remark
@@ -230,9 +228,6 @@ def _warnings(
             "deviations are scaled up by the same factor"
         )
         found.append(Remark("excess-residuals", text))
-    if slopes == 1:
-        text = "only one slope: whether the parameters apply on other slopes is not checked"
-        found.append(Remark("one-slope", text))
     for name, range_ in assumed.items():
         text = (
             f"{name} has neither a value nor a range in [soil]: {range_.lower:g} to "

@@ -150,7 +150,7 @@ def test_every_parameter_of_the_soil_is_mapped_or_said_to_be_ignored(tmp_path, n
     [
         (["result.json", "--to", "crono"], "did you mean 'chrono'? there are: chrono, gazebo"),
         (["result.json", "--to", "chrono", "--draws", "401"], "has 400 draws: give 400 or fewer"),
-        (["result.json", "--to", "chrono", "--group", "a"], "has one result; omit it"),
+        (["several.json", "--to", "chrono"], "needed is one soil: soilml identify --where"),
         (["plain.toml", "--to", "gazebo", "--draws", "3"], "have no prior in [soil.prior]"),
         (["old.json", "--to", "gazebo"], "lacks model.soil"),
         (["drawless.json", "--to", "gazebo", "--draws", "3"], "only averaged and posterior"),
@@ -173,6 +173,7 @@ def test_what_cannot_be_exported_is_one_line(tmp_path, monkeypatch, capsys, word
         "wild": good | {"model": {"soil": wild}},
         "ragged": good | {"draws": {"cohesion": [1.0], "n": [1.0, 1.1]}},
         "list": [1, 2],
+        "several": {"runs": {"a": good, "b": good}},
     }
     for name, content in files.items():
         (tmp_path / f"{name}.json").write_text(json.dumps(content))
