@@ -22,17 +22,11 @@ from soilml.systems.wheel_legs.resistive_force import (
 
 GRAVITY = 9.81
 TOLERANCE = 1e-6  # A step has converged when the forces balance to this fraction of the weight
-#: Newton iterations of a step, and halvings of one Newton update that does not reduce the
-#: imbalance.
-MAX_NEWTON_STEPS, MAX_HALVINGS = 25, 8
+MAX_NEWTON_STEPS = 25
 #: Largest change of velocity by a Newton update, as a fraction of the speed of the leg's end: the
 #: force is a function of the direction of motion and nearly singular at rest.
 MAX_UPDATE = 0.3
-#: How often a step that does not converge is halved, and a step with an abrupt change of velocity.
-MAX_BISECTIONS, MAX_ABRUPT_BISECTIONS = 16, 5
-#: Change of the vertical velocity that counts as abrupt (a fall or an impact), as a fraction of the
-#: speed of the leg's end.
-ABRUPT_CHANGE = 0.2
+MAX_BISECTIONS = 16  # How often a step that does not converge is halved
 HALVINGS = 40  # Bisection steps for the height of the hub at the start
 
 
@@ -231,15 +225,14 @@ def implicit_step(
 
     .. math:: M (v' - v) / dt = F(v', z + v'_z dt) - M g
 
-    is solved by a damped Newton method in both velocities. Cases that do not converge, or whose
-    velocity changes abruptly, take the step in two halves, recursively (`depth`). A case with a
-    commanded slip has its horizontal velocity prescribed.
+    is solved by a damped Newton method in both velocities. Cases that do not converge take the step
+    in two halves, recursively (`depth`). A case with a commanded slip has its horizontal velocity
+    prescribed.
 
     Returns hubs (4, cases), forces (3, cases) at the end, and whether they balance there, (cases,).
     """
     end, forces, converged = _newton(legs, hub, start, stop)
-    abrupt = np.abs(end[3] - hub[3]) > ABRUPT_CHANGE * legs.tip_speed
-    repeated = np.flatnonzero(~converged | (abrupt & (depth < MAX_ABRUPT_BISECTIONS)))
+    repeated = np.flatnonzero(~converged)
     if repeated.size and depth < MAX_BISECTIONS:
         middle, some = 0.5 * (start + stop), legs.select(repeated)
         halfway, _, first = implicit_step(some, hub[:, repeated], start, middle, depth + 1)
@@ -283,14 +276,8 @@ def _newton(legs: WalkingLegs, hub: Array, start: float, stop: float) -> tuple[A
         length = np.maximum(np.hypot(*update), 1e-300)
         share = np.minimum(1.0, MAX_UPDATE * legs.tip_speed / length)
         share = np.where(norm < TOLERANCE, 0.0, share)
-        for halving in range(MAX_HALVINGS):
-            trial = imbalance(v + share * update)
-            worse = ~(trial[1] < norm) & (share > 0.0)
-            if halving == MAX_HALVINGS - 1 or not np.any(worse):
-                break
-            share = np.where(worse, 0.5 * share, share)
         v = v + share * update
-        residual, norm, forces, rates = trial
+        residual, norm, forces, rates = imbalance(v)
     return np.concatenate([hub[:2] + v * dt, v]), forces, norm < TOLERANCE
 
 
