@@ -76,7 +76,6 @@ _ALL = (
     Quantity("slope", "alpha", "rad", "slope of the ground along the travel, positive uphill"),
     Quantity("rim_speed", "r omega", "m/s", "speed of the rim of the wheel about its axle"),
     Quantity("wheel_speed", "omega", "rad/s", "rotation of the wheel, positive forward"),
-    Quantity("commanded_speed", "v_c", "m/s", "speed of the rims that was commanded"),
     Quantity("current", "I", "A", "current of the motor, positive when it drives forward"),
     Quantity("roll", "rho", "rad", "roll of the rover, positive where its left side is higher"),
     Quantity(

@@ -36,9 +36,7 @@ OPTIONS: Mapping[str, Mapping[str, str]] = {
     "estimate": {"--case": "--model"},
     "export c": {"--rows": "--step-rows"},
     "export slip": {"--soils": "--draws"},
-    "export soil": {"--run": "--group"},
     "paper numbers": {"--json": "--out"},
-    "paper walk": {"--speed": "--angular-speed"},
     "plan next": {"--slips": "--slip", "--loads": "--load"},
 }
 

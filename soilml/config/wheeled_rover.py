@@ -199,6 +199,11 @@ def take_rover(settings: Settings, gears: Mapping[str, Model]) -> WheeledRover:
     Raises `InputError` for a missing or misspelt key, a value out of bounds, an unknown gear, a
     gear that is no rigid wheel, or fewer than two wheels.
     """
+    if "wheels" not in settings and "radius" in settings:
+        settings.fail(
+            "a rover of four equal wheels is for soilml paper climb; here each wheel stands in "
+            "[rover.wheels], as front-left = { position = [0.4, 0.3] }"
+        )
     rover = take_declared(WheeledRover, settings)
     for name, wheel in rover.wheels.items():
         if wheel.gear and wheel.gear not in gears:

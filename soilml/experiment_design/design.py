@@ -1,4 +1,4 @@
-"""Which rows could be measured next, and the uncertainty expected to remain after each."""
+"""Which row could be measured next, and the uncertainty expected to remain after each."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError, InputError
 from soilml.experiment_design.expected_variance import (
     OUTCOMES,
-    ExpectedVariance,
     expected_variance,
     predicted_readings,
 )
@@ -37,8 +35,6 @@ LIGHTER, HEAVIER = 0.5, 2.0
 #: Most grid points that are labelled with their value in a map, and most ticks of an axis.
 MOST_LABELS, TICKS = 80, 8
 MOST_POINTS = 1000  # Most operating points of a grid
-Floats32 = NDArray[np.float32]
-NO_ROWS = np.zeros((1, 1), np.float32)  # Log likelihood of no rows
 
 
 @dataclass(frozen=True)
@@ -109,7 +105,7 @@ class RatedRow:
 
 @dataclass(frozen=True, repr=False)
 class Advice(Result):
-    """Expected effect of each next measurement, and the best sequence of several.
+    """Expected effect of each next measurement.
 
     Attributes
     ----------
@@ -119,9 +115,6 @@ class Advice(Result):
         Fraction (p,) of each prior's width that remains before the next measurement.
     choices
         All candidates at which the wheel can be driven.
-    sequence
-        The best first row, the best second one after it, and so on; their fractions are those after
-        all rows so far.
     excluded_points
         Number of grid points at which the wheel might not be carried.
     measured
@@ -133,7 +126,6 @@ class Advice(Result):
     names: tuple[str, ...]
     current_fraction: Floats
     choices: tuple[RatedRow, ...]
-    sequence: tuple[RatedRow, ...]
     excluded_points: int
     measured: Operating | None = None
     remarks: tuple[Remark, ...] = ()
@@ -149,7 +141,11 @@ class Advice(Result):
 
     def best(self, name: str | None = None, channels: tuple[str, ...] | None = None) -> RatedRow:
         """The choice with the least remaining fraction of one parameter, or of all (`overall`)."""
-        return best_row(self.with_channels(channels or self.channel_sets[0]), self.names, name)
+        choices = self.with_channels(channels or self.channel_sets[0])
+        if name is None:
+            return min(choices, key=lambda c: c.overall)
+        i = list(self.names).index(name)
+        return min(choices, key=lambda c: float(c.remaining_fraction[i]))
 
     def report(self) -> Report:
         """The best next rows, and maps of what each row would leave."""
@@ -186,14 +182,12 @@ class Advice(Result):
         return self._columns([(str(i), c) for i, c in enumerate(ranked, 1)])
 
     def best_columns(self) -> dict[str, Any]:
-        """A row for each best candidate: in all, for each parameter, of the sequence."""
+        """A row for each best candidate: in all, and for each parameter."""
         rows = [("best in all", self.best())]
         rows += [
             (f"best in all with {own[1]}", self.best(None, own)) for own in self.channel_sets[1:]
         ]
         rows += [(f"best for {name}", self.best(name)) for name in self.names]
-        if (count := len(self.sequence)) > 1:
-            rows += [(f"row {i} of {count}", c) for i, c in enumerate(self.sequence, 1)]
         return self._columns(rows)
 
     def _columns(self, rows: Sequence[tuple[str, RatedRow]]) -> dict[str, Any]:
@@ -210,32 +204,21 @@ class Advice(Result):
         return columns
 
 
-def best_row(choices: Sequence[RatedRow], names: Sequence[str], name: str | None) -> RatedRow:
-    """The choice with the least remaining fraction of one parameter, or of all (`overall`)."""
-    if name is None:
-        return min(choices, key=lambda c: c.overall)
-    i = list(names).index(name)
-    return min(choices, key=lambda c: float(c.remaining_fraction[i]))
-
-
 def rate_rows(
     case: Case,
     samples: ParameterSamples,
     grid: CandidateGrid,
     *,
-    count: int = 1,
     covariates: Mapping[str, float] | None = None,
     outcome_count: int = OUTCOMES,
 ) -> Advice:
     """Rate every slip, load and set of channels by the variance expected to remain after a row.
 
-    The sequence is greedy, each row the best after those before it, with the first set of channels.
     All ratings assume that the model is correct. A remaining fraction is an expectation over
     readings; the one realised differs.
 
     samples: What is known of the parameters: samples of the prior, or of a posterior.
     grid: Slips and loads (N) that can be driven.
-    count: Length of the sequence.
     covariates: Further fields of `Operating`, the same for all candidates.
     outcome_count: Number of simulated readings of each candidate.
 
@@ -249,38 +232,24 @@ def rate_rows(
     others = {key: np.full(len(points), value) for key, value in (covariates or {}).items()}
     ahead = predicted_readings(case, samples, Operating(slip=slip, load=load, **others))
 
-    def rate(
-        channels: tuple[str, ...], outcomes: ExpectedVariance, earlier: Floats32 = NO_ROWS
-    ) -> list[RatedRow]:
-        """Points that can be driven, after rows with the log likelihood `earlier`."""
-        found = []
-        for k in np.flatnonzero(ahead.drivable):
-            log = outcomes.log_likelihood(ahead, channels, int(k)) + earlier
-            left = np.sqrt(outcomes.remaining_variance(log))
-            found.append(RatedRow(*points[k], channels, left))
-        return found
-
     names = tuple(f.path for f in samples.free)
-    sets = channel_sets(ahead.channels)
-    outcomes = expected_variance(samples, len(ahead.channels), outcome_count)
-    first = rate(sets[0], outcomes)
-    if not first:
+    drivable = np.flatnonzero(ahead.drivable)
+    if not drivable.size:
         raise FitError(
             "at each of these slips and loads some soils that are still possible do not carry the "
             "wheel: try smaller loads, or narrow [soil.prior]"
         )
-    sequence, earlier, own = [best_row(first, names, None)], NO_ROWS, outcomes
-    for step in range(1, count):
-        last = points.index((sequence[-1].slip, sequence[-1].load))
-        earlier = earlier + own.log_likelihood(ahead, sets[0], last)
-        own = outcomes.with_noise(step)
-        sequence.append(best_row(rate(sets[0], own, earlier), names, None))
+    outcomes, choices = expected_variance(samples, len(ahead.channels), outcome_count), []
+    for channels in channel_sets(ahead.channels):
+        for k in drivable:
+            log = outcomes.log_likelihood(ahead, channels, int(k))
+            left = np.sqrt(outcomes.remaining_variance(log))
+            choices.append(RatedRow(*points[k], channels, left))
     return Advice(
         names=names,
         current_fraction=samples.remaining_fraction,
-        choices=(*first, *(row for own in sets[1:] for row in rate(own, outcomes))),
-        sequence=tuple(sequence),
-        excluded_points=len(points) - len(first),
+        choices=tuple(choices),
+        excluded_points=len(points) - drivable.size,
     )
 
 
@@ -298,14 +267,12 @@ def _row_text(advice: Advice, choice: RatedRow) -> str:
 
 
 def _lines(advice: Advice) -> Iterator[str]:
-    """What is left of a parameter that is not identified, now and after the best rows for it."""
+    """What is left of a parameter that is not identified, now and after the best row for it."""
     for name in _vague(advice):
         i = advice.names.index(name)
         now = float(advice.current_fraction[i])
         text = f"These rows leave {share_left(now)} the prior's width of {name.replace('_', ' ')}"
         text += f"; the best row for it leaves {advice.best(name).remaining_fraction[i]:.0%}"
-        if (count := len(advice.sequence)) > 1:
-            text += f", the {count} planned rows {advice.sequence[-1].remaining_fraction[i]:.0%}"
         yield f"{text}."
 
 

@@ -112,11 +112,6 @@ class ExpectedVariance:
     normal: Floats  # (c, j)
     samples: ParameterSamples
 
-    def with_noise(self, seed: int) -> ExpectedVariance:
-        """The same samples with fresh noise, for another row."""
-        normal = np.random.default_rng(seed).standard_normal(self.normal.shape)
-        return replace(self, normal=normal)
-
     def log_likelihood(
         self, predicted: PredictedReadings, channels: Sequence[str], point: int
     ) -> Floats32:
@@ -193,4 +188,5 @@ def expected_variance(
     """Outcomes of `count` samples, resampled by their weights, for a number of channels."""
     offset = np.random.default_rng(seed).random()
     index = systematic_resampling(samples.weights, count, offset)
-    return ExpectedVariance(index, np.zeros((channels, count)), samples).with_noise(seed)
+    normal = np.random.default_rng(seed).standard_normal((channels, count))
+    return ExpectedVariance(index, normal, samples)

@@ -1,4 +1,4 @@
-"""The rows that are worth measuring next, after those of a table or by the prior."""
+"""The row that is worth measuring next, after those of a table or by the prior."""
 
 from __future__ import annotations
 
@@ -20,8 +20,6 @@ from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
 from soilml.remarks import Remark
 
-COUNT = 3  # Default number of rows in the sequence
-
 
 def advise(
     case: GivenCase,
@@ -30,7 +28,6 @@ def advise(
     free: Sequence[str] | None = None,
     slips: Sequence[float] | None = None,
     loads: Sequence[float] | None = None,
-    count: int = COUNT,
     exact_model: bool = False,
 ) -> Advice:
     """The rows that are worth measuring next, by the variance expected to remain after them.
@@ -45,8 +42,6 @@ def advise(
         Paths of the unknown parameters; by default those with a prior.
     slips, loads
         Slips and loads (N) that can be driven; by default usual slips, and the loads of the rows.
-    count
-        Length of the planned sequence.
     exact_model
         Whether model and sensors are exactly as in the file.
 
@@ -64,7 +59,7 @@ def advise(
     selected = select_free(case, free)
     if rows is None:
         samples = samples_of_prior(selected, case=case)
-        found = rate_rows(case, samples, candidate_grid(slips, loads), count=count)
+        found = rate_rows(case, samples, candidate_grid(slips, loads))
         notes, measured = list[Remark](), None
     else:
         readings = usable_readings(case, as_table(rows))
@@ -78,7 +73,6 @@ def advise(
             case,
             samples_of_rows(case, fitted, selected, exact_model=exact_model),
             candidate_grid(slips, loads, readings.row_load),
-            count=count,
             covariates=covariates,
         )
     if case.states_model_error:

@@ -1,4 +1,4 @@
-"""Runs that a simulator is to make: a design over slip, load and soil, and further runs."""
+"""Runs that a simulator is to make: a design over slip, load and soil."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ Columns = dict[str, Floats]
 
 #: Runs for each input: of a first design, and of further ones.
 FIRST, FURTHER = 20, 5
-CANDIDATES = 1024  # Points among which further runs are chosen
 
 
 def design_inputs(case: Case) -> dict[str, Prior]:
@@ -55,48 +54,6 @@ def space_filling_runs(case: Case, count: int, seed: int = 0) -> Columns:
     return {
         name: np.asarray([float(f"{x:.7g}") for x in prior.at(u[:, i])])
         for i, (name, prior) in enumerate(inputs.items())
-    }
-
-
-def further_runs(
-    case: Case,
-    table: Table,
-    gear: EmulatedGear,
-    emulator: GaussianEmulator,
-    count: int,
-    seed: int = 0,
-) -> Columns:
-    r"""Runs where the emulator of a table of runs is least sure, (count,) each.
-
-    From Sobol points, the one with the largest standard deviation of any channel over its spread is
-    taken, again and again; the variance of the others falls by what correlates with it:
-
-    .. math:: v(u) \leftarrow v(u) (1 - k(u, u_\ast)^2)
-
-    gear, emulator: As `soilml.config.simulator.emulator_of` makes them of the table.
-
-    Raises `InputError` for runs that vary what has no prior.
-    """
-    from scipy.stats import qmc
-
-    inputs = design_inputs(case)
-    u = qmc.Sobol(len(inputs), rng=seed).random(CANDIDATES)
-    values = {name: prior.at(u[:, i]) for i, (name, prior) in enumerate(inputs.items())}
-    known = [column(name) for name in gear.inputs]
-    if missing := [name for name in known if name not in inputs]:
-        raise InputError(f"{table.source} varies {missing[0]}, which has no prior in [soil.prior]")
-    points = gear.fractions(np.stack([values[name] for name in known], axis=1))
-    spread = np.stack([np.std(table[column(name)]) for name in gear.channels])
-    variance = (emulator.std(points) / np.maximum(spread, 1e-300)) ** 2
-    chosen = []
-    for _ in range(count):
-        best = int(np.argmax(variance.max(axis=1)))
-        chosen.append(best)
-        for i, part in enumerate(emulator.parts):
-            near = part.correlation(points, points[best : best + 1])[:, 0]
-            variance[:, i] *= np.maximum(1.0 - near**2, 0.0)
-    return {
-        name: np.asarray([float(f"{x:.7g}") for x in own[chosen]]) for name, own in values.items()
     }
 
 

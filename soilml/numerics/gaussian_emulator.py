@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,8 +15,6 @@ LENGTHS, NUGGETS = (0.1, 20.0), (1e-8, 0.1)
 #: Points that the lengths are found from: more change them little, and take the cube of the time.
 MOST_FITTED = 200
 FOLDS = 4  # Parts of the points that are left out in turn
-#: Share of the errors at points left out that its intervals hold, and these in standard deviations.
-COVERED, COVERED_STD = 0.9, 1.6449
 MOST_STEPS = 60  # Steps of the search for the lengths
 BLOCK = 4096  # Points that are predicted at a time
 
@@ -56,18 +54,6 @@ class GaussianEmulator:
                 )
         return found
 
-    def std(self, u: Floats) -> Floats:
-        """Standard deviations (m, k) at points (m, d): 90 % intervals of them hold 90 % of errors.
-
-        Those of the process, which hold too few, as it takes its lengths for known, by the factor
-        that points left out ask for.
-        """
-        found = np.empty((len(u), len(self.parts)))
-        for i, part in enumerate(self.parts):
-            between = np.linalg.solve(part.factor, part.correlation(u, self.points).T)
-            found[:, i] = part.scale * np.sqrt(np.maximum(1.0 - (between**2).sum(axis=0), 0.0))
-        return found
-
     @property
     def error(self) -> Floats:
         """Root mean square (k,) of the errors at points left out."""
@@ -76,13 +62,11 @@ class GaussianEmulator:
 
 @dataclass(frozen=True)
 class EmulatorPart:
-    """The process of one output: lengths (d,), trend (1 + d,), weights (n,), factor (n, n)."""
+    """The process of one output: lengths (d,), trend (1 + d,), weights (n,)."""
 
     lengths: Floats
     trend_weights: Floats
     weights: Floats
-    factor: Floats  # Cholesky factor of the correlations of the points, with the nugget
-    scale: float  # Standard deviation of the process
 
     def trend(self, u: Floats) -> Floats:
         """The linear trend (m,) at points (m, d)."""
@@ -99,19 +83,14 @@ def fit_emulator(points: Floats, outputs: Floats) -> GaussianEmulator:
     Outputs must be finite, and n at least 4 (d + 3) / 3. The result depends on the points alone.
     """
     parts = [_fit_part(points, y) for y in outputs.T]
-    left, stated = np.empty(outputs.shape), np.empty(outputs.shape)
+    left = np.empty(outputs.shape)
     fold = np.random.default_rng(0).permutation(len(points)) % FOLDS
     for number in range(FOLDS):
         out = fold == number
         own = tuple(_fit_part(points[~out], y) for y in outputs[~out].T)
         fewer = GaussianEmulator(points[~out], own, left[:0])
-        left[out], stated[out] = outputs[out] - fewer(points[out]), fewer.std(points[out])
-    ratio = np.abs(left) / np.maximum(stated, 1e-300)
-    factors = np.quantile(ratio, COVERED, axis=0, method="higher") / COVERED_STD
-    scaled = (
-        replace(p, scale=p.scale * float(max(f, 1.0))) for p, f in zip(parts, factors, strict=True)
-    )
-    return GaussianEmulator(points, tuple(scaled), left)
+        left[out] = outputs[out] - fewer(points[out])
+    return GaussianEmulator(points, tuple(parts), left)
 
 
 def _fit_part(u: Floats, y: Floats) -> EmulatorPart:
@@ -122,16 +101,14 @@ def _fit_part(u: Floats, y: Floats) -> EmulatorPart:
     lengths, nugget = _most_likely(u[chosen], z[chosen])
     h = _basis(u)
     k = _correlation(u / lengths, u / lengths) + nugget * np.eye(len(u))
-    factor = np.asarray(np.linalg.cholesky(k), dtype=np.float64)
     inverse = np.linalg.inv(k)
     with_h = inverse @ h
     projection = inverse - with_h @ np.linalg.solve(h.T @ with_h, with_h.T)
     weights = projection @ z
     beta = np.linalg.solve(h.T @ with_h, with_h.T @ z)
-    scale = math.sqrt(max(float(z @ weights) / max(len(u) - h.shape[1], 1), 1e-300))
     trend = np.asarray(spread * beta, dtype=np.float64)
     trend[0] += y.mean()
-    return EmulatorPart(lengths, trend, spread * weights, factor, spread * scale)
+    return EmulatorPart(lengths, trend, spread * weights)
 
 
 def _most_likely(u: Floats, z: Floats) -> tuple[Floats, float]:

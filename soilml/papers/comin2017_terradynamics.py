@@ -40,7 +40,7 @@ def _walked() -> dict[tuple[str, str], dict[str, Array]]:
     """Metrics of all walks, by choice and group, which one batch takes no longer for than each.
 
     Groups: 1 to 6 `legs` without feet, fig. 5; `feet` on each of the stiffnesses, fig. 6; `soils`
-    of the four names in three states, on which eq. 29 is fitted, without their stress at no depth.
+    of the four names in three states, on which eq. 29 is fitted.
     """
     cases: dict[tuple[str, str], list[tuple[WheelLeg, LinearGround]]] = {}
     for choice, changes in OPEN_CHOICES.items():
@@ -52,7 +52,7 @@ def _walked() -> dict[tuple[str, str], dict[str, Array]]:
             for foot in FEET
             for alpha in STIFFNESSES
         ]
-    cases["as assumed", "soils"] = [(wheel_leg(), replace(g, offset=0.0)) for g in _soils()]
+    cases["as assumed", "soils"] = [(wheel_leg(), ground) for ground in _soils()]
     legs, grounds = zip(*(case for group in cases.values() for case in group), strict=True)
     found, first, metrics = {}, 0, gait_metrics(walk(legs, grounds))
     for group, own in cases.items():

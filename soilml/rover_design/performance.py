@@ -1,4 +1,4 @@
-"""What designs do on a slope in many worlds: margin, slip, work, torque, sinkage, lugs needed."""
+"""What designs do on a slope in many worlds: margin, slip, work, torque, sinkage."""
 
 from __future__ import annotations
 
@@ -33,7 +33,6 @@ class Outcomes:
         where the soil does not carry a wheel at any slip.
     slip, energy, torque, sinkage: Slip that the slope needs, work of the wheels for each metre
         (J/m), largest torque (N m) and sinkage (m) of a wheel there; NaN where it is not climbed.
-    lugs: Lugs on a wheel that the soil between them needs to move with it; NaN without lugs.
     pull_error: What the errors of the model add to the largest pull, N.
     met: Whether the goal is met.
     """
@@ -43,7 +42,6 @@ class Outcomes:
     energy: Floats
     torque: Floats
     sinkage: Floats
-    lugs: Floats
     pull_error: Floats
     met: NDArray[np.bool_]
 
@@ -69,8 +67,7 @@ def evaluate(
 
     Raises `InputError` where a wheel leaves the ground on the slope.
 
-    References: Wong, Theory of Ground Vehicles, chapters 2 and 3; Skonieczny, Moreland and
-    Wettergreen, IROS 2012, for the number of lugs.
+    References: Wong, Theory of Ground Vehicles, chapters 2 and 3.
     """
     count = len(designs["radius"])
     parts: list[tuple[NDArray[np.int64], Outcomes]] = []
@@ -117,13 +114,11 @@ def _of_equal_wheels(
     work = 2.0 * torque.sum(axis=2) / (radius * (1.0 - slip))
     found_slip = at.of_curve(np.broadcast_to(slip, total.shape))
     found_sinkage = at.of_curve(sinkage.max(axis=2))
-    lugs = lugs_needed(designs["radius"][:, None], designs["lug_height"][:, None],
-                       found_sinkage, found_slip)  # fmt: skip
     energy, most_torque = at.of_curve(work), at.of_curve(torque.max(axis=2))
     met = (margin >= goal.margin) & (most_torque <= goal.torque_limit)
     met &= energy <= goal.energy_limit
     return Outcomes(
-        margin, found_slip, energy, most_torque, found_sinkage, lugs, np.nan_to_num(error), met
+        margin, found_slip, energy, most_torque, found_sinkage, np.nan_to_num(error), met
     )
 
 
@@ -180,24 +175,3 @@ def _range_with_zero(values: Floats) -> Floats:
     known = np.nan_to_num(values)
     high, low = known.max(axis=-1, keepdims=True), known.min(axis=-1, keepdims=True)
     return np.asarray(np.maximum(high, 0.0) - np.minimum(low, 0.0))
-
-
-def lugs_needed(radius: Floats, height: Floats, sinkage: Floats, slip: Floats) -> Floats:
-    r"""Least number of lugs on a wheel between which the soil moves with it.
-
-    .. math:: \frac{2\pi}{N} < \frac{1}{1 - s} \left(\sqrt{(1 + h / r)^2 - (1 - z / r)^2} -
-        \sqrt{1 - (1 - z / r)^2}\right)
-
-    With fewer, soil flows forward ahead of the rim, and the effect `grousers` overstates the pull.
-
-    References: Skonieczny, Moreland and Wettergreen, A grouser spacing equation for determining
-    appropriate geometry of planetary rover wheels, IROS 2012.
-
-    >>> float(lugs_needed(*map(np.asarray, (0.1, 0.01, 0.01, 0.2))))
-    26.0
-    """
-    above = 1.0 - sinkage / radius
-    with np.errstate(invalid="ignore", divide="ignore"):
-        tip = np.sqrt((1.0 + height / radius) ** 2 - above**2)
-        spacing = (tip - np.sqrt(1.0 - above**2)) / (1.0 - slip)
-        return np.asarray(np.where(height > 0.0, np.ceil(2.0 * np.pi / spacing), np.nan))

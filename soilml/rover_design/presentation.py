@@ -37,10 +37,9 @@ _COLUMNS = (
     ("energy_J_per_m", "work", "J/m"),
     ("slip", "slip", "1"),
     ("torque_Nm", "torque", "N m"),
-    ("lugs_needed", "lugs needed", "1"),
 )
 #: Results that hold where the slope is climbed.
-_WHERE_CLIMBED = ("slip", "energy_J_per_m", "torque_Nm", "lugs_needed")
+_WHERE_CLIMBED = ("slip", "energy_J_per_m", "torque_Nm")
 
 
 def report_of_design(found: DesignReport, title: str) -> Report:
@@ -71,7 +70,6 @@ def report_of_design(found: DesignReport, title: str) -> Report:
             ("margin", "largest pull up to the slip limit less the weight along the slope."),
             ("margin at risk", "exceeded with the probability that the risk leaves."),
             ("share", "of the variance of the margin, by one input alone."),
-            ("lugs needed", "so many that the soil between them moves with the wheel."),
         ],
     )  # fmt: skip
 

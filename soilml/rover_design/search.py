@@ -43,8 +43,8 @@ class Designs:
 
     dimensions: Values (k,) by the names of the study's dimensions.
     results: `probability` of meeting the goal, `probability_climbed` of a margin of zero,
-        `margin_at_risk_N` (exceeded with the probability 1 - risk), `lugs_needed`, and medians with
-        ends of 90 % bands of `RESULTS`, (k,) each by column name.
+        `margin_at_risk_N` (exceeded with the probability 1 - risk), and medians with ends of 90 %
+        bands of `RESULTS`, (k,) each by column name.
     """
 
     dimensions: Mapping[str, Floats]
@@ -176,7 +176,6 @@ def summary(study: DesignStudy, found: Outcomes) -> dict[str, Floats]:
     for name, key in RESULTS.items():
         for ending, fraction in QUANTILES.items():
             results[key + ending] = quantile_of_worlds(getattr(found, name), fraction)
-    results["lugs_needed"] = quantile_of_worlds(found.lugs, 0.5)
     return results
 
 

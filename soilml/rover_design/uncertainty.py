@@ -129,8 +129,6 @@ def _inputs(worlds: DrawnWorlds, outcome: Outcomes) -> dict[str, Floats]:
     numbers: dict[str, Floats] = {**soil, **worlds.errors}
     numbers["lug_shearing"] = worlds.lug_shearing
     numbers["drawbar_pull"] = outcome.pull_error[0]
-    if not np.isfinite(outcome.lugs).any():
-        del numbers["lug_shearing"]
     for name, values in numbers.items():
         size = float(np.abs(worlds.soil.get(name, values)).max())
         if (name in WORDS or name in soil) and np.ptp(values) > 1e-9 * size:

@@ -32,7 +32,6 @@ LIKELY = 0.5  # Probability from which on a ground is called hard, or a slip bey
 #: Rows whose misfit is judged together, and normal quantile beyond which it is not chance.
 JUDGED, QUANTILE = 10, 3.72
 LEAST_SHARE = 0.02  # Rim speed below which a wheel stands, over the fastest of the drive
-BEHIND = 0.8  # Rim speed over the commanded one below which the drives do not keep up
 
 FLAGS = {
     "standing": "all wheels stand: there is no slip",
@@ -43,7 +42,6 @@ FLAGS = {
     "beyond": "more slip than the table has, or stuck: the slip is a lower limit",
     "not-determined": "the interval of the slip is wide",
     "torque-set-aside": "a torque is beyond what any soil carries: left out, as if not read",
-    "behind-command": "the rims turn more slowly than commanded",
 }
 #: Flags of rows without an answer.
 REFUSED = ("standing", "wheel-stopped", "not-steady", "no-soil")
@@ -59,7 +57,6 @@ class DriveRows:
     torque: Floats  # N m (n, k); NaN where there is none
     load: Floats  # N (n, k)
     slope: Floats  # Pitch, rad, positive uphill (n,)
-    commanded: Floats  # m/s (n,); NaN where there is none
 
 
 @dataclass(frozen=True, repr=False)
@@ -90,8 +87,7 @@ class DriveSlip(Result):
             if code == "not-determined":
                 low, high = np.median(self.slip[rows][:, [0, 2]].max(axis=2), axis=0)
                 said += f", {low:.2f} to {high:.2f} in the median"
-            severity = "note" if code in ("standing", "behind-command") else "warning"
-            yield Remark(code, said, severity=severity)  # type: ignore[arg-type]
+            yield Remark(code, said, severity="note" if code == "standing" else "warning")
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each time in SI units: medians and 90 % intervals; refused rows are blank."""
@@ -167,8 +163,8 @@ def read_drive(table: Rows, case: Case) -> DriveRows:
     """The rows of a table that has one for each time and wheel.
 
     Columns: time_s, wheel, rim_speed_m_s or wheel_speed_rad_s, torque_Nm or current_A, slope_rad
-    (the pitch), and, where known, roll_rad, load_N and commanded_speed_m_s. Without load_N, the
-    loads follow from [rover].
+    (the pitch), and, where known, roll_rad and load_N. Without load_N, the loads follow from
+    [rover].
 
     Raises `TableError` for a missing column or cell, an unknown wheel, a time without each wheel,
     and wheels that all stand; `InputError` for a case without [rover].
@@ -210,9 +206,7 @@ def read_drive(table: Rows, case: Case) -> DriveRows:
     else:
         roll = each("roll_rad")[:, 0] if "roll_rad" in table else np.zeros(len(slope))
         load = rover.loads(slope, np.nan_to_num(roll)).T
-    command = "commanded_speed_m_s"
-    commanded = each(command)[:, 0] if command in table else np.full(len(slope), np.nan)
-    return DriveRows(wheels, each("time_s")[:, 0], rim, torque, load, slope, commanded)
+    return DriveRows(wheels, each("time_s")[:, 0], rim, torque, load, slope)
 
 
 def _one_of(table: Table, name: str, other: str) -> str:
@@ -276,8 +270,6 @@ def slip_of_drive(case: Case, rows: Rows | DriveRows, *, soils: int = SOILS) -> 
         found = list(_after(answer.no_soil, answer.beyond, misfit, answer.slip, k))
         if (np.abs(drive.torque[i]) > filter_.most_torque).any():
             found.append("torque-set-aside")
-        if drive.commanded[i] * BEHIND > np.abs(drive.rim_speed[i]).mean():
-            found.append("behind-command")
         flags.append(tuple(found))
         if "no-soil" not in found:
             ends = answer.speed if way > 0.0 else -answer.speed[::-1]

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from soilml.errors import InputError, did_you_mean
 from soilml.io.atomic_files import write_files
-from soilml.io.text_tables import csv_text
 from soilml.parameters import declared, unit_text
 from soilml.physics.soils import Soil
 from soilml.remarks import Remark
@@ -22,7 +21,7 @@ from soilml.results import Result
 from soilml.soil_export.source_soil import SourceSoil, read_source_soil
 from soilml.soil_export.targets import TARGETS, SoilTarget
 
-README, RECORD, DRAWS = "README.txt", "export.json", "draws.csv"
+README, RECORD = "README.txt", "export.json"
 FORMAT_VERSION = 1  # Raised where a key of export.json changes its meaning or goes
 MOST_DRAWS = 9999
 
@@ -34,7 +33,6 @@ class SoilExport(Result):
     target: The program.
     known: What the file knows of the soil, in SI units.
     values, draws: Parameters by the program's names, in its units, and those of each draw.
-    given: Parameters that the user gave, by name.
     remarks: What limits the files: codes `not-determined`, `not-measured`, `effects-lost`,
         `defaulted`.
     """
@@ -43,7 +41,6 @@ class SoilExport(Result):
     known: SourceSoil
     values: dict[str, float]
     draws: tuple[dict[str, float], ...]
-    given: dict[str, float]
     remarks: tuple[Remark, ...]
 
     def files(self, words: Sequence[str] = (), inputs: Iterable[str] = ()) -> dict[str, str]:
@@ -56,9 +53,6 @@ class SoilExport(Result):
         digits = max(3, len(str(len(self.draws))))
         for number, values in enumerate(self.draws, 1):
             files |= self.target.written(values, f"_{number:0{digits}d}")
-        if self.draws:
-            columns = {name: [draw[name] for draw in self.draws] for name in self.values}
-            files[DRAWS] = csv_text(columns)
         names = [*files, README, RECORD]
         files[README] = f"{self.report().text(details=True)}\n"
         files[RECORD] = json_text(self.as_json(names, Provenance.of(words, inputs)))
@@ -85,19 +79,16 @@ class SoilExport(Result):
         }
 
     def origin(self, name: str) -> str:
-        """Where the value of a parameter is from: `rows`, `model file`, `prior`, `given`, ..."""
+        """Where the value of a parameter is from: `rows`, `model file`, `prior` or `default`."""
         for own in self.target.mapped:
             if own.name == name:
                 return ", ".join(dict.fromkeys(self.known.origin[part] for part in own.soil))
-        return "given" if name in self.given else "default"
+        return "default"
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each parameter, in the units of the program."""
         why = {own.name: own.equation for own in self.target.mapped}
-        why |= {
-            own.name: "given with --set" if own.name in self.given else own.reason
-            for own in self.target.asked
-        }
+        why |= {own.name: own.reason for own in self.target.fixed}
         return {
             "parameter": list(self.values),
             "known from": [self.origin(name) for name in self.values],
@@ -131,8 +122,7 @@ class SoilExport(Result):
         ]
         draws = (
             f"{len(self.draws)} equally likely soils keep the correlations of the parameters: "
-            f"simulate each, and take the spread of the results as that of the soil. {DRAWS} has a "
-            "row for each."
+            f"simulate each, and take the spread of the results as that of the soil."
         )
         return Report(
             kind="export",
@@ -151,8 +141,6 @@ def export_soil(
     out: str | os.PathLike[str] | None = None,
     *,
     draws: int = 0,
-    given: Mapping[str, float] | None = None,
-    run: str | None = None,
     seed: int = 0,
     words: Sequence[str] = (),
 ) -> SoilExport:
@@ -168,10 +156,6 @@ def export_soil(
         Folder for the files; it is made where it is missing. None: nothing is written.
     draws
         Number of draws of the posterior, or of the priors of a model file, as files of their own.
-    given
-        Parameters of the program that no wheel test reveals, by name and in its unit.
-    run
-        Which result, where the file has one for each run.
     seed
         Seed of the choice of draws.
     words
@@ -184,8 +168,8 @@ def export_soil(
     Raises
     ------
     InputError
-        For a target, a parameter or a run that does not exist, for values that the program would
-        misread, and where the source has not as many draws.
+        For a target that does not exist, for values that the program would misread, and
+        where the source has not as many draws.
 
     Examples
     --------
@@ -209,37 +193,24 @@ def export_soil(
     """
     if to not in TARGETS:
         raise InputError(f"--to {to!r}; {did_you_mean(to, TARGETS)}there are: {', '.join(TARGETS)}")
-    target, given = TARGETS[to], dict(given or {})
-    _check_given(target, given)
+    target = TARGETS[to]
     if not 0 <= draws <= MOST_DRAWS:
         raise InputError(f"--draws is {draws}; needed is a whole number from 0 to {MOST_DRAWS}")
-    known = read_source_soil(source, run)
+    known = read_source_soil(source)
     remarks = list(known.remarks)
-    for own in target.asked:
-        if own.name not in given:
-            text = (
-                f"{own.name} = {own.default:g} {unit_text(own.unit)}".rstrip()
-                + f" is a default: {own.reason}; --set {own.name}=VALUE replaces it"
-            )
-            remarks.append(Remark("defaulted", text, (own.name,)))
-    values = target.values(known.values, given)
+    for own in target.fixed:
+        text = f"{own.name} = {own.value:g} {unit_text(own.unit)} is a default: {own.reason}"
+        remarks.append(Remark("defaulted", text, (own.name,)))
+    values = target.values(known.values)
     soils = known.drawn(draws, seed) if draws else []
-    drawn = tuple(target.values(soil, given) for soil in soils)
+    drawn = tuple(target.values(soil) for soil in soils)
     used = {part for own in target.mapped for part in own.soil}
     of_soil = ("not-determined", "not-measured")  # of no interest where the program has no use
     kept = tuple(r for r in remarks if r.code not in of_soil or used & {*r.about})
-    export = SoilExport(target, known, values, drawn, given, kept)
+    export = SoilExport(target, known, values, drawn, kept)
     if out is not None:
         _write(export, Path(out), words)
     return export
-
-
-def _check_given(target: SoilTarget, given: Mapping[str, float]) -> None:
-    names = [own.name for own in target.asked]
-    for name in given:
-        if name not in names:
-            hint = f"there are: {', '.join(names)}" if names else f"{target.name} asks for none"
-            raise InputError(f"--set {name}: {did_you_mean(name, names)}{hint}")
 
 
 def _write(export: SoilExport, folder: Path, words: Sequence[str]) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.case import Case, read_case
-from soilml.errors import InputError, did_you_mean
+from soilml.errors import InputError
 from soilml.fitting.coordinates import select_free
 from soilml.identification.posterior import prior_fractions
 from soilml.io.atomic_files import refuse_device
@@ -70,19 +70,15 @@ class SourceSoil:
         ]
 
 
-def read_source_soil(path: str | os.PathLike[str], run: str | None = None) -> SourceSoil:
+def read_source_soil(path: str | os.PathLike[str]) -> SourceSoil:
     """The soil in the file that `soilml identify --out` wrote, or in a model file.
 
     path: A file whose name ends in .json or .toml.
-    run: Which result, where the file has one for each run.
 
-    Raises `InputError` for a file that is neither, lacks the soil, or has several results and `run`
-    names none.
+    Raises `InputError` for a file that is neither, lacks the soil, or has several results.
     """
     file = Path(path)
     if file.suffix.lower() == ".toml":
-        if run is not None:
-            raise InputError(f"--run {run!r}: a model file has one soil; omit it")
         return _of_case(read_case(file, with_bias=True), str(path))
     if file.suffix.lower() != ".json":
         raise InputError(
@@ -98,23 +94,12 @@ def read_source_soil(path: str | os.PathLike[str], run: str | None = None) -> So
         raise InputError(f"{path} is not JSON; needed is the file of `soilml identify`") from None
     if not isinstance(content, dict) or not {"parameters", "runs"} & content.keys():
         raise InputError(f"{path} is no result of `soilml identify`; needed is its file of --out")
-    return _of_fit(_result(Settings(content, str(path)), run), str(path))
-
-
-def _result(content: Settings, run: str | None) -> Settings:
-    """The entry of one fit; raises `InputError` where the file has none of that name."""
-    if "parameters" in content:
-        if run is not None:
-            raise InputError(f"--run {run!r}: {content.where} has one result; omit it")
-        return content
-    runs = content.table("runs")
-    names = ", ".join(runs.content)
-    if run is None:
-        content.fail(f"it has {len(runs.content)} results; name one with --run: {names}")
-    if run not in runs:
-        hint = did_you_mean(run, runs.content)
-        content.fail(f"it has no run {run!r}; {hint}there are: {names}")
-    return runs.table(run)
+    if "parameters" not in content:
+        raise InputError(
+            f"{path} has {len(content['runs'])} results; needed is one soil: soilml identify "
+            "--where run=NAME"
+        )
+    return _of_fit(Settings(content, str(path)), str(path))
 
 
 def _of_fit(fit: Settings, path: str) -> SourceSoil:

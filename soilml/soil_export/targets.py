@@ -7,9 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from soilml.errors import InputError
-from soilml.io.text_tables import csv_text
-from soilml.parameters import declared
-from soilml.physics.soils import Soil
 from soilml.report.page import json_text
 
 Values = Mapping[str, float]
@@ -30,18 +27,13 @@ class MappedParameter:
 
 
 @dataclass(frozen=True)
-class AskedParameter:
-    """A parameter of a program that no wheel test reveals, with its default and the reason for it.
-
-    `above` names a mapped parameter that it must exceed.
-    """
+class FixedParameter:
+    """A parameter of a program that no wheel test reveals, with its value and the reason for it."""
 
     name: str
     unit: str
-    default: float
+    value: float
     reason: str
-    lower: float = 0.0
-    above: str = ""
 
 
 @dataclass(frozen=True)
@@ -51,7 +43,7 @@ class SoilTarget:
     name: What `--to` takes.
     program: What it is, with the version or file that was read.
     sources: Addresses of the documentation that units and equations are taken from.
-    mapped, asked: Its parameters.
+    mapped, fixed: Its parameters.
     ignored: Why it has no use for parameters of the soil, by name.
     files: By name, in which `{}` stands for the label of a draw: a text with values by the
         program's names, or what makes one of them.
@@ -64,7 +56,7 @@ class SoilTarget:
     program: str
     sources: tuple[str, ...]
     mapped: tuple[MappedParameter, ...]
-    asked: tuple[AskedParameter, ...]
+    fixed: tuple[FixedParameter, ...]
     ignored: dict[str, str]
     files: Mapping[str, str | Callable[[Values], str]]
     loading: str
@@ -82,24 +74,15 @@ class SoilTarget:
     def units(self) -> dict[str, str]:
         """The unit of each parameter."""
         mapped = {own.name: own.unit for own in self.mapped}
-        return mapped | {own.name: own.unit for own in self.asked}
+        return mapped | {own.name: own.unit for own in self.fixed}
 
-    def values(self, soil: Values, given: Values) -> dict[str, float]:
+    def values(self, soil: Values) -> dict[str, float]:
         """Every parameter by the program's name and in its unit.
 
         Raises `InputError` for a value that the program would not take as meant.
         """
         found = {own.name: own.value(soil) for own in self.mapped}
-        for own in self.asked:
-            value = given.get(own.name, own.default)
-            least = max(own.lower, found[own.above] if own.above else own.lower)
-            if not (math.isfinite(value) and value >= own.lower) or (own.above and value <= least):
-                bound = f"above {own.above}, {least:g}" if own.above else f"{own.lower:g} or more"
-                raise InputError(
-                    f"{own.name} is {value:g} {own.unit}; {self.name} needs {bound}: give "
-                    f"--set {own.name}=VALUE"
-                )
-            found[own.name] = value
+        found |= {own.name: own.value for own in self.fixed}
         self.check(found)
         return found
 
@@ -108,7 +91,6 @@ def _same(name: str, unit: str, soil: str, equation: str) -> MappedParameter:
     return MappedParameter(name, unit, equation, (soil,), lambda v: v[soil])
 
 
-_TAN = ("1", "tan(friction_angle)", math.tan)
 _DEGREES = (
     "deg", "180/pi friction_angle, of Mohr-Coulomb: tau_max = c + sigma tan(phi)", math.degrees
 )  # fmt: skip
@@ -140,11 +122,6 @@ def _scm(values: Values) -> str:
     return json_text(content)
 
 
-def _csv(values: Values) -> str:
-    units = [declared(Soil)[name].unit for name in values]
-    return csv_text({"parameter": list(values), "value": list(values.values()), "unit": units})
-
-
 _GAZEBO_PLUGIN = """\
 soilml:
   k: 0.0
@@ -156,17 +133,6 @@ soilml:
   rho: {rho:.9g}
   n: {n:.9g}
 """
-_SDF_SURFACE = """\
-<?xml version="1.0"?>
-<surface>
-  <friction>
-    <ode>
-      <mu>{mu:.9g}</mu>
-      <mu2>{mu:.9g}</mu2>
-    </ode>
-  </friction>
-</surface>
-"""
 
 
 def _check_gazebo(values: Values) -> None:
@@ -174,6 +140,14 @@ def _check_gazebo(values: Values) -> None:
         raise InputError(
             "kphi is 0; gz-terramechanics computes its modulus from k_c and k_phi only where k_phi "
             "is not 0: give kphi, which with kc / width carries the wheel"
+        )
+
+
+def _check_chrono(values: Values) -> None:
+    if values["Bekker_Kphi"] >= values["elastic_K"]:
+        raise InputError(
+            f"kphi is {values['Bekker_Kphi']:g}; chrono needs it below elastic_K, "
+            f"{values['elastic_K']:g} Pa/m: this soil is stiffer than its elastic unloading"
         )
 
 
@@ -193,13 +167,12 @@ _CHRONO_SCM = SoilTarget(
         _angle("Mohr_friction", *_DEGREES),
         _same("Janosi_shear", "m", "shear_modulus", "K, of tau = tau_max (1 - exp(-j/K))"),
     ),
-    asked=(
-        AskedParameter(
+    fixed=(
+        FixedParameter(
             "elastic_K", "Pa/m", 2e8,
             "unloading was not measured; 2e8 is what Chrono's own ChWheelTestRig sets",
-            above="Bekker_Kphi",
         ),
-        AskedParameter(
+        FixedParameter(
             "damping_R", "Pa s/m", 3e4,
             "damping was not measured; 3e4 is what Chrono's own ChWheelTestRig sets",
         ),
@@ -219,15 +192,15 @@ terrain.SetSoilParameters(*soil.values())  # in the order of the file, before In
         "the pressure at one depth differs.",
         "Below elastic_K times depth, pressure is elastic; damping_R acts on all vertical motion.",
     ),
+    check=_check_chrono,
 )  # fmt: skip
 
 _GAZEBO = SoilTarget(
     name="gazebo",
-    program="Gazebo: soil_params.yaml of gz-terramechanics, and friction of SDFormat",
+    program="Gazebo: soil_params.yaml of gz-terramechanics",
     sources=(
         "https://github.com/unitsSpaceLab/gz-terramechanics/blob/main/config/soil_params.yaml",
         "https://github.com/unitsSpaceLab/gz-terramechanics/blob/main/src/TerramechanicsSystem.cc",
-        "http://sdformat.org/spec?elem=surface",
     ),
     mapped=(
         _same("k_c", "N/m^(n+1)", "kc", "kc; the plugin takes k = k_c / b + k_phi"),
@@ -237,40 +210,20 @@ _GAZEBO = SoilTarget(
         _same("K", "m", "shear_modulus", "K, of tau = (c + sigma tan(phi)) (1 - exp(-j/K))"),
         _same("rho", "N/m^3", "unit_weight", "unit_weight: rho is a weight, for bulldozing"),
         _same("n", "1", "n", "n"),
-        _angle("mu", *_TAN),
     ),
-    asked=(),
+    fixed=(),
     ignored=dict.fromkeys(
         ("a0", "a1"), "gz-terramechanics puts the maximum stress at half the entry angle"
     ),
-    files={"soil_params{}.yaml": _GAZEBO_PLUGIN, "surface{}.sdf": _SDF_SURFACE},
+    files={"soil_params{}.yaml": _GAZEBO_PLUGIN},
     loading="""\
-Take one of the two, not both: the plugin expects wheels without friction of their own.
-soil_params.yaml: copy it into the folder config_path of the plugin gz-terramechanics, and
-name the soil in terrain_mapping.yaml: default_soil: soilml.
-surface.sdf: without the plugin, put <surface> into <collision> of the ground.""",
+Copy soil_params.yaml into the folder config_path of the plugin gz-terramechanics, and name the
+soil in terrain_mapping.yaml: default_soil: soilml. Its wheels have no friction of their own.""",
     lost=(
         "The plugin's stress is largest at theta_1 / 2, that of the fit at (a0 + a1 s) theta_1.",
-        "surface.sdf is Coulomb friction on rigid ground: no sinkage, no cohesion, no bearing, no "
-        "K. Its mu bounds the pull; `soilml pull` tells what is left of it at a slip.",
     ),
     check=_check_gazebo,
 )
 
-_CSV = SoilTarget(
-    name="csv",
-    program="a table in SI units, for any other program",
-    sources=(),
-    mapped=tuple(
-        _same(name, parameter.unit, name, parameter.text)
-        for name, parameter in declared(Soil).items()
-    ),
-    asked=(),
-    ignored={},
-    files={"soil{}.csv": _csv},
-    loading="Rows are parameters, in SI units; angles are in radians.",
-    lost=(),
-)
-
 #: Every target by the name that `--to` takes.
-TARGETS: dict[str, SoilTarget] = {target.name: target for target in (_CHRONO_SCM, _GAZEBO, _CSV)}
+TARGETS: dict[str, SoilTarget] = {target.name: target for target in (_CHRONO_SCM, _GAZEBO)}

@@ -17,8 +17,8 @@ from soilml.optional_imports import need
 MOST_CELLS = 4_000_000
 # Tags and keys of GeoTIFF (OGC 19-008r4, annex B), and two of GDAL
 _SCALE, _TIEPOINT, _KEYS, _METADATA, _NODATA = 33550, 33922, 34735, 42112, 42113
-_MODEL_TYPE, _RASTER_TYPE, _PROJECTED = 1024, 1025, 3072
-_PROJECTED_MODEL, _USER_DEFINED, _PIXEL_IS_AREA = 1, 32767, 1
+_MODEL_TYPE, _RASTER_TYPE = 1024, 1025
+_USER_DEFINED, _PIXEL_IS_AREA = 32767, 1
 UNKNOWN = 255  # Pixel of a cell without an answer
 
 
@@ -62,19 +62,17 @@ class MapGrid:
         return whole.reshape(self.shape)
 
 
-def geotiff(grid: MapGrid, bands: Mapping[str, Floats], epsg: int | None = None) -> bytes:
+def geotiff(grid: MapGrid, bands: Mapping[str, Floats]) -> bytes:
     """A GeoTIFF with a band of 32-bit numbers for each grid of values, NaN where unknown.
 
-    epsg: Code of the projected coordinate system of x and y; None: local coordinates in m.
+    Coordinates are local, in m.
 
     Raises `MissingLibraryError` where tifffile is not installed.
     """
     need("tifffile", "map", "map")
     import tifffile
 
-    keys = [(_MODEL_TYPE, _PROJECTED_MODEL if epsg else _USER_DEFINED)]
-    keys += [(_RASTER_TYPE, _PIXEL_IS_AREA)]
-    keys += [(_PROJECTED, epsg)] if epsg else []
+    keys = [(_MODEL_TYPE, _USER_DEFINED), (_RASTER_TYPE, _PIXEL_IS_AREA)]
     directory = [1, 1, 0, len(keys), *(n for key, value in keys for n in (key, 0, 1, value))]
     names = "".join(
         f'<Item name="DESCRIPTION" sample="{i}" role="description">{escape(name)}</Item>'

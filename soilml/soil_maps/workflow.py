@@ -56,7 +56,7 @@ class SoilMap(Result):
     grid, known: Cells of the map, and which of them (cells,) are within reach of a reading.
     score, covariance: Normal scores of the soil in the k cells that are known, (k, p) and (k, p,
         p).
-    ability: The rover straight up slopes; None for a model file without [rover].
+    ability: The rover straight up slopes.
     notes: Remarks on model file and trained file.
     """
 
@@ -68,7 +68,7 @@ class SoilMap(Result):
     known: NDArray[np.bool_]
     score: Floats
     covariance: Floats
-    ability: MapAbility | None
+    ability: MapAbility
     notes: tuple[Remark, ...] = ()
 
     @cached_property
@@ -77,9 +77,9 @@ class SoilMap(Result):
         return parameter_moments(self.soils, self.score, self.covariance)
 
     @property
-    def occupied(self) -> Floats | None:
+    def occupied(self) -> Floats:
         """Probability (k,) of not climbing the steepest slope asked for."""
-        return None if self.ability is None else 1.0 - self.ability.climbed[:, -1]
+        return np.asarray(1.0 - self.ability.climbed[:, -1])
 
     @property
     def changes(self) -> Floats:
@@ -90,12 +90,11 @@ class SoilMap(Result):
 
     def bands(self) -> dict[str, Floats]:
         """Grids of the parameters with their standard deviations, and of the rover's slopes."""
-        found = self._soil_columns(self.moments)
-        if (own := self.ability) is not None:
-            for j, slope in enumerate(np.rad2deg(own.slope)):
-                found[f"climbs_{slope:g}_deg"] = own.climbed[:, j]
-                found[f"slip_{slope:g}_deg"] = own.slip[:, j]
-                found[f"energy_{slope:g}_deg_J_m"] = own.energy[:, j]
+        found, own = self._soil_columns(self.moments), self.ability
+        for j, slope in enumerate(np.rad2deg(own.slope)):
+            found[f"climbs_{slope:g}_deg"] = own.climbed[:, j]
+            found[f"slip_{slope:g}_deg"] = own.slip[:, j]
+            found[f"energy_{slope:g}_deg_J_m"] = own.energy[:, j]
         return {name: self.grid.spread(values, self.known) for name, values in found.items()}
 
     def _soil_columns(self, moments: tuple[Floats, Floats]) -> dict[str, Floats]:
@@ -125,7 +124,7 @@ class SoilMap(Result):
             kind="map",
             verdict=verdict,
             lines=lines,
-            tables=[_patches(self), *([_slopes(self)] if self.ability is not None else [])],
+            tables=[_patches(self), _slopes(self)],
             pictures=[
                 Picture(
                     "Map", partial(_draw_map, self), 2, 2, SIZE, verdict,
@@ -162,13 +161,10 @@ class SoilMap(Result):
             "remarks": [remark.as_json() for remark in self.remarks()],
         }
 
-    def files(
-        self, folder: Path, epsg: int | None, draw: Callable[[Path], None]
-    ) -> dict[Path, Any]:
+    def files(self, folder: Path, draw: Callable[[Path], None]) -> dict[Path, Any]:
         """Content of each file of the folder of a map; `draw` makes the picture."""
-        binary = {"map.tif": geotiff(self.grid, self.bands(), epsg)}
-        if (occupied := self.occupied) is not None:
-            binary |= nav2_files(self.grid, self.grid.spread(occupied, self.known))
+        binary = {"map.tif": geotiff(self.grid, self.bands())}
+        binary |= nav2_files(self.grid, self.grid.spread(self.occupied, self.known))
         files: dict[str, Any] = {
             name: lambda path, content=content: path.write_bytes(content)
             for name, content in binary.items()
@@ -192,8 +188,6 @@ class SoilMap(Result):
         if vague:
             text = f"hardly determined in any cell: {', '.join(vague)}"
             yield Remark("not-determined", text, tuple(vague))
-        if self.ability is None:
-            yield Remark("no-rover", "the model file has no [rover]: soil alone, no slopes")
 
 
 def soil_map(
@@ -211,8 +205,7 @@ def soil_map(
     Parameters
     ----------
     case
-        Gear, soil and noise, or the path of a model file; priors for a file that needs them; with a
-        rover for slopes.
+        Gear, soil, noise and rover, or the path of a model file; priors for a file that needs them.
     rows
         A table as `read_map_drive` takes it.
     estimator
@@ -232,8 +225,8 @@ def soil_map(
     Raises
     ------
     InputError
-        For a gear or effect that the file is not for, several gears, a cell or reach beyond
-        `SIZES` or without a known cell, and as `DrivenVehicle.check_slopes` does.
+        For a gear or effect that the file is not for, several gears, no rover, a cell or reach
+        beyond `SIZES` or without a known cell, and as `DrivenVehicle.check_slopes` does.
     TableError, FitError
         As `read_map_drive`, `follow` and `local_soils` do.
     """
@@ -245,8 +238,7 @@ def soil_map(
     if case.gears:
         raise InputError("the model file has several gears; a map is of the wheels of one: --gear")
     asked = np.asarray(slopes, dtype=np.float64)
-    if case.rover is not None:
-        DrivenVehicle.of_rover(case).check_slopes(asked)
+    DrivenVehicle.of_rover(case).check_slopes(asked)
     own = Estimator.load(MODEL) if estimator is None else estimator
     if own.sets is None:
         raise InputError(f"{own.path} has no set posterior; train it with [set_posterior]")
@@ -274,9 +266,7 @@ def soil_map(
             "ones with --cell, or a longer --reach"
         )
     mean, covariance = field.at(grid.centres[known])
-    ability = None
-    if case.rover is not None:
-        ability = map_ability(case, soils, mean, covariance, asked)
+    ability = map_ability(case, soils, mean, covariance, asked)
     return SoilMap(
         drive, followed, soils, field, grid, known, mean, covariance, ability, tuple(notes)
     )
@@ -319,14 +309,8 @@ def _patches(found: SoilMap) -> ReportTable:
 
 
 def _slopes(found: SoilMap) -> ReportTable:
-    """A row for each slope: cells by the probability of climbing, mean slip and energy."""
+    """A row for each slope: cells by the probability of climbing."""
     ability = found.ability
-    assert ability is not None
-    means = []
-    for values in (ability.slip, ability.energy):
-        known = np.isfinite(values)
-        total = np.where(known, values, 0.0).sum(axis=0)
-        means.append((total / np.where(known.any(axis=0), known.sum(axis=0), np.nan)).tolist())
     likely = [np.mean(ability.climbed > p, axis=0).tolist() for p in (0.5, 0.9)]
     return ReportTable(
         "Probability of climbing",
@@ -334,27 +318,21 @@ def _slopes(found: SoilMap) -> ReportTable:
             Column("slope", ability.slope.tolist(), "rad", digits=3),
             Column("cells above 50 %", likely[0], "share", digits=3),
             Column("above 90 %", likely[1], "share", digits=3),
-            Column("mean slip", means[0], digits=2),
-            Column("work", means[1], "J/m", digits=2),
         ],
     )
 
 
 def _draw_map(found: SoilMap, axes: Any) -> None:
-    """Draw friction angle and its uncertainty, the probability of climbing and the slip needed.
-
-    Without a rover, cohesion and its uncertainty are in the place of the last two.
-    """
-    mean, std = found.moments
-    shown: list[tuple[str, Floats, tuple[float | None, float | None]]] = []
-    for i in (1, 0)[: 1 if found.ability is not None else 2]:
-        factor, name = shown_column(QUANTITIES[found.soils.free[i].path].column)
-        shown.append((pretty(name), factor * mean[:, i], (None, None)))
-        shown.append(("its standard deviation", factor * std[:, i], (None, None)))
-    if found.ability is not None and (occupied := found.occupied) is not None:
-        which = f"{np.rad2deg(found.ability.slope[-1]):g} deg"
-        shown.append((f"probability of climbing {which}", 1.0 - occupied, (0.0, 1.0)))
-        shown.append((f"slip needed for {which}", found.ability.slip[:, -1], (0.0, None)))
+    """Draw friction angle and its uncertainty, the probability of climbing and the slip needed."""
+    (mean, std), ability = found.moments, found.ability
+    factor, name = shown_column(QUANTITIES[found.soils.free[1].path].column)
+    which = f"{np.rad2deg(ability.slope[-1]):g} deg"
+    shown: list[tuple[str, Floats, tuple[float | None, float | None]]] = [
+        (pretty(name), factor * mean[:, 1], (None, None)),
+        ("its standard deviation", factor * std[:, 1], (None, None)),
+        (f"probability of climbing {which}", ability.climbed[:, -1], (0.0, 1.0)),
+        (f"slip needed for {which}", ability.slip[:, -1], (0.0, None)),
+    ]
     grid = found.grid
     extent = (grid.west, grid.west + grid.cell * grid.shape[1],
               grid.south, grid.south + grid.cell * grid.shape[0])  # fmt: skip

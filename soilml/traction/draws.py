@@ -43,17 +43,6 @@ class DrawnErrors:
         functions = self.functions[key].at(np.clip(slip, *self.slip), np.clip(load, *self.load))
         return np.asarray((functions * self.weights[key][draw]).sum(axis=1))
 
-    def amplitude(self, channel: str) -> float:
-        """Largest standard deviation of the draws of a channel's error; 0 without one."""
-        grid = np.meshgrid(np.linspace(*self.slip, 9), np.geomspace(*self.load, 9))
-        at = [values.ravel() for values in grid]
-        found = [
-            np.sqrt(((f.at(*at) @ self.weights[name, gear].T) ** 2).mean(axis=1).max())
-            for (name, gear), f in self.functions.items()
-            if name == channel
-        ]
-        return float(max(found, default=0.0))
-
     def of_draws(self, index: NDArray[np.int64]) -> DrawnErrors:
         """The errors of some of the draws."""
         return replace(self, weights={key: w[index] for key, w in self.weights.items()})

@@ -14,9 +14,8 @@ from soilml.errors import InputError
 from soilml.fitting.mixtures import EXCLUDED_KINDS
 from soilml.numerics.quantiles import quantile_band
 from soilml.physics.soils.gravity_law import GravityChange
-from soilml.quantities import NOT_IDENTIFIED_ABOVE, QUANTITIES, WEAKLY_IDENTIFIED_ABOVE
+from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE
 from soilml.remarks import Remark
-from soilml.report.numbers import format_quantity
 from soilml.traction.draws import DrawnErrors, SoilDraws
 from soilml.traction.vehicle import DrivenVehicle, Performance, performance
 
@@ -180,19 +179,16 @@ def gravity_remarks(case: Case, gravity: GravityChange | None, of_rover: bool) -
 
 
 def band_content(before: DrawnErrors | None, beside: str) -> Remark:
-    """What the bands include, with the errors `before` any reading, and what they do not.
+    """What the bands include, with the channels of the errors `before`, and what they do not.
 
     >>> print(band_content(None, "no side slope"))
     bands include the uncertainty of the soil and the noise, not errors of the model; no side slope
     """
     included = "the uncertainty of the soil and the noise, not errors of the model"
     if before is not None:
-        names = list(dict.fromkeys(name for name, _ in before.functions))
-        sizes = [format_quantity(before.amplitude(n), QUANTITIES[n].unit, digits=3) for n in names]
-        said = [f"{n.replace('_', ' ')} {size}" for n, size in zip(names, sizes, strict=True)]
+        names = dict.fromkeys(name.replace("_", " ") for name, _ in before.functions)
         included = (
-            "the uncertainty of the soil, the noise and errors of the model "
-            f"({', '.join(said)} before any reading)"
+            f"the uncertainty of the soil, the noise and errors of the model ({', '.join(names)})"
         )
     return Remark("band-content", f"bands include {included}; {beside}", severity="note")
 

@@ -64,7 +64,6 @@ def test_the_interval_contains_the_steepest_slope(folder, true, capsys):
     assert low - 0.01 < true.steepest < high + 0.01
     modulus = found["soil"]["parameters"]["shear_modulus"]
     assert abs(modulus["value"] - true.shear[2]) < 3.5 * modulus["std"]
-    assert found["given"]["cohesion"] == 0.0
     assert len(found["climbs"]["run"]) == 6
 
 
@@ -136,7 +135,7 @@ FAULTS = {
     ),
     "a slope beyond grip": (
         lambda r, s: (of_run(r, "slope_rad", "8deg_1", 1.2), s),
-        "run 8deg_1: a slope of 1.2 rad requires",
+        "no single soil within the ranges explains these climbs",
     ),
     "climbs that contradict": (
         lambda r, s: (of_run(r, "slope_rad", "8deg_1", 0.5), s),

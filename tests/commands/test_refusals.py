@@ -138,7 +138,6 @@ LINES = {
     "plan next model.toml runs.csv --slip x": "--slip is 'x'; needed is start:stop:count",
     "plan next model.toml --load 1:100:2000": "too many to try; at most 1000",
     "plan next model.toml --load 60 --where run=a": "--where selects rows of RUNS.csv",
-    "plan next model.toml runs.csv --count 9": "--count: '9' given; needed is a whole number",
     "plan next model.toml runs.csv --slip 1.5": "slip 1.5 cannot be driven",
     "plan next model.toml --load 0": "load 0 N cannot be driven",
     "plan next model.toml --load 1e6": "try smaller loads",

@@ -6,8 +6,7 @@ from console import refused, rows_printed
 
 from soilml.systems.wheel_legs.stride_relations import (
     TORQUE,
-    TORQUE_SLIP,
-    VIBRATION_SLIP,
+    VIBRATION,
     soil_of_sinkage,
 )
 
@@ -44,20 +43,19 @@ def test_each_sensor_and_the_fused_soil(strides, capsys):
 
 def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
     angle, stiffness = np.deg2rad(42.77), 13100.0 + 10500.0  # SSC-2 of table I
-    a, b = TORQUE_SLIP["empirical"].line(angle, stiffness)
-    c, d = VIBRATION_SLIP["planar"].line(angle, stiffness)
+    a, b = TORQUE.line(angle, stiffness)
+    c, d = VIBRATION.line(angle, stiffness)
     lines = [f"a,{s},{(s - a) / b},{(s - c) / d},\n" for s in (0.1, 0.3)]
     file, picture = tmp_path / "strides.csv", tmp_path / "slip.png"
     file.write_text(HEAD + "".join(lines) + f"b,,,{(0.4 - c) / d},\n")
-    command = ["paper", "wheel-leg", str(file), "--torque-model", "empirical"]
-    command += ["--vibration-model", "planar", "--known"]
+    command = ["paper", "wheel-leg", str(file), "--known"]
     found = rows_printed([*command, "ssc-2", "--picture", picture], capsys)
     for row, slip in zip(found, (0.1, 0.3, 0.4), strict=True):
         for name in ("slip_by_torque", "slip_by_vibration", "slip"):
             assert row[name] == "" or float(row[name]) == pytest.approx(slip, abs=2e-4)
     assert found[2]["slip_by_torque"] == found[2]["slip_measured"] == ""
-    assert float(found[0]["slip_std"]) == pytest.approx((1 / 0.005 + 1 / 0.015) ** -0.5)  # eq. 26
-    assert float(found[2]["slip_std"]) == pytest.approx(0.015**0.5)
+    assert float(found[0]["slip_std"]) == pytest.approx((1 / 0.018 + 1 / 0.020) ** -0.5)  # eq. 26
+    assert float(found[2]["slip_std"]) == pytest.approx(0.020**0.5)
     assert picture.read_bytes().startswith(b"\x89PNG")
     again = rows_printed([*command, "42.77,23600"], capsys)
     assert float(again[1]["slip"]) == pytest.approx(float(found[1]["slip"]), abs=1e-3)
@@ -70,8 +68,6 @@ def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
         ("run,slip,torque_Nm\na,0.2,\n", [], "nothing was measured"),
         ("run,slip,sinkage_m\na,0.2,-0.01\n", [], "a midstance sinkage must be above 0 m"),
         ("run,slip,torque_Nm\na,0.2,1.1\n", ["--assume", "x=1"], "needed are n, cohesion"),
-        ("run,slip,torque_Nm\na,0.2,1.1\n", ["--wheel", "0.1"], "needed are radius, width and"),
-        ("run,torque_Nm\na,1.1\n", ["--known", "es-3", "--torque-model", "x"], "no slip model 'x'"),
         ("run,torque_Nm\na,1.1\n", ["--known", "mud"], "needed is one of SSC-1, SSC-2"),
         ("run,torque_Nm\na,1.1\n", ["--known", "95,2e4"], "needed is one of SSC-1, SSC-2"),
         ("run,torque_Nm\na,1.1\n", ["--known", "es-3", "--by", "run"], "--by asks for a soil"),

@@ -22,6 +22,10 @@ from soilml.papers.published import (
 from soilml.papers.report import number_report
 
 ROWS = list(printed_numbers())
+COLUMNS = (
+    *("key", "what", "source", "unit", "published"),
+    *("tolerance", "status", "counted_with", "reason"),
+)
 EVERY = [chapter for name in PAPERS for chapter in CHAPTERS.get(name, (name,))]
 
 
@@ -90,7 +94,7 @@ def test_every_chapter_is_complete():
         assert len(set(keys)) == len(keys), chapter
         assert set(importlib.import_module(f"soilml.papers.{chapter}").COMPUTED) <= set(keys)
         for entry in entries:
-            assert tuple(entry) == tuple(read_chapter(EVERY[0])[0]), chapter
+            assert tuple(entry) == COLUMNS, chapter
             assert all(entry[name] for name in ("what", "source", "unit", "tolerance")), entry
 
 

@@ -60,7 +60,7 @@ def results(folder):
         "identify": identify(model, runs, method="posterior"),
         "gap": gap(str(model), runs),
         "pull": pull(model, runs, loads=[60.0], exact_model=True),
-        "advise": advise(model, runs, count=1),
+        "advise": advise(model, runs),
         "estimate": estimator.run(slip=[0.1, 0.3], torque=[1.6, 2.7], load=[60.0] * 2),
     }
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.option_values import whole_number_from
 from soilml.cli.options import OutputFile
 from soilml.errors import InputError
 
@@ -21,18 +20,16 @@ MODEL.toml.
 <parameter>_left is the standard deviation that is expected after a row,
 divided by that of the prior (1: nothing learned), over soils drawn as by
 soilml identify. Rows are the best candidate for all parameters together and
-for each, and the best sequence of --count rows.
+for each.
 
 Candidate channels are those whose noise is declared in [noise]: torque alone,
 and torque with each other channel. Without --load, loads from half to twice
 the measured ones are tried.
 """
-MAX_COUNT = 5  # Largest number of rows planned in a sequence
 ARGUMENTS = (
     "model-and-any-runs",
     ("--slip S,...", "candidate slips: A,B,... or start:stop:count"),
     ("--load N,...", "candidate loads in N"),
-    ("--count N", "rows of the planned sequence (default: 3)", whole_number_from(1, MAX_COUNT)),
     "free",
     ("--all", "list every candidate, best first"),
     "effects",
@@ -50,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import deliver
     from soilml.cli.progress import working
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
-    from soilml.experiment_design.next_rows import COUNT, advise
+    from soilml.experiment_design.next_rows import advise
     from soilml.io.read_table import RUNS
 
     if args.where is not None and args.runs is None:
@@ -70,7 +67,6 @@ def run(args: argparse.Namespace) -> int:
             free=parse_names(args.free),
             slips=slips,
             loads=loads,
-            count=args.count or COUNT,
             exact_model=args.exact_model,
         )
     columns = found.frame_columns() if args.all else found.best_columns()

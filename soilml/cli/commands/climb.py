@@ -23,7 +23,7 @@ ROVER.toml describes a rover with four wheels:
   [soil]        known parameters, such as cohesion = 0.0 (Pa)
   [soil.prior]  ranges of the others, such as shear_modulus = [0.001, 0.05] (m)
   [noise]       such as speed_m_s = "0.9 %", slope_rad = 0.005,
-                normal_Pa = "5 %", entry_angle_rad, speed_scale, front_load
+                normal_Pa = "5 %", entry_angle_rad, front_load
 
 RUNS.csv has a row for each wheel of each steady run: run, wheel (front or
 rear), slope_rad, and either slip or speed_m_s and rim_speed_m_s. A run without

@@ -16,9 +16,9 @@ table of [simulator]; then identify, pull and gap use that simulator.
   soilml plan runs MODEL.toml --out design.csv             the first runs
   soilml plan runs MODEL.toml --count 40 --out more.csv    40 more
 
-The first runs fill the space evenly. Where the table exists, further runs are
-those at which the emulator of the runs is least sure, to be added to it. The
-error of the emulator is printed: it is a part of every interval.
+The runs fill the space evenly. Where the table exists, further runs fill it
+anew, to be added to it. The error of the emulator is printed: it is a part of
+every interval.
 """
 ARGUMENTS = (
     ("model MODEL.toml", "gear, soil, priors and [simulator]", InputFile),
@@ -52,10 +52,9 @@ def run(args: argparse.Namespace) -> int:
         earlier = read_runs(simulator.runs)
         made = emulator_of(earlier, simulator.gear, case.prior)
         tell("\n".join(runs.emulator_errors(earlier, *made)))
-        count = args.count or runs.FURTHER * len(inputs)
-        design = runs.further_runs(case, earlier, *made, count, args.seed)
+        most, seed = runs.FURTHER, args.seed + len(earlier)  # not the runs of before
     else:
-        count = args.count or runs.FIRST * len(inputs)
-        design = runs.space_filling_runs(case, count, args.seed)
-    write_columns(design, args.out)
+        most, seed = runs.FIRST, args.seed
+    count = args.count or most * len(inputs)
+    write_columns(runs.space_filling_runs(case, count, seed), args.out)
     return 0

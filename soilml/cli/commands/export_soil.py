@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.option_values import named_numbers, whole_number_from
-from soilml.cli.options import REPEATED, REQUIRED, InputFile, folder_outputs
+from soilml.cli.option_values import whole_number_from
+from soilml.cli.options import REQUIRED, InputFile, folder_outputs
 from soilml.errors import InputError
 
 DESCRIPTION = """\
@@ -21,24 +21,21 @@ of the equations, of what is ignored and of what no wheel test reveals.
 FIT.json is the file that `soilml identify --out` wrote, or a model file.
 Targets:
   chrono      Project Chrono, deformable terrain SCM
-  gazebo      soil_params.yaml of gz-terramechanics, and friction of SDFormat
-  csv         the parameters in SI units
+  gazebo      soil_params.yaml of gz-terramechanics
 
 --draws N adds N soils of the posterior, a file each, for Monte Carlo runs. The
 posterior is that of the methods averaged and posterior; of a model file, draws
 are those of its priors. Parameters that rows cannot reveal, such as elastic_K
-of Chrono, have a default that is named as such; --set gives your value.
+of Chrono, have a default that is named as such: replace it in the file.
 
 FOLDER has the files, README.txt, and export.json with the remarks. A warning
 says where one file hides that a parameter is not determined.
 """
 ARGUMENTS = (
     ("fit FIT.json", "result of identify, or MODEL.toml", InputFile),
-    ("--to TARGET", "chrono, gazebo or csv", REQUIRED),
+    ("--to TARGET", "chrono or gazebo", REQUIRED),
     ("--out FOLDER", "folder for the files", REQUIRED),
     ("--draws N (0)", "number of soils drawn from the posterior", whole_number_from(0)),
-    ("--set NAME=VALUE", "value that rows cannot reveal; can be repeated", REPEATED),
-    ("--group NAME", "which result of `identify --by`"),
     "seed",
 )
 
@@ -53,7 +50,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import show_result, tell
     from soilml.soil_export import export_soil
 
-    given = named_numbers(args.set, "--set", "NAME=NUMBER, such as elastic_K=1e8")
     if not args.out:
         raise InputError("--out is empty; needed is a folder")
     words = getattr(args, "command_line", [])
@@ -62,8 +58,6 @@ def run(args: argparse.Namespace) -> int:
         args.to,
         args.out,
         draws=args.draws,
-        given=given,
-        run=args.group,
         seed=args.seed,
         words=words,
     )

@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.option_values import NumberFrom, whole_number_from
+from soilml.cli.option_values import NumberFrom
 from soilml.cli.options import InputFile, folder_outputs
 
 SIZE = NumberFrom(0.01, 1000.0, "m")  # Of a cell, and how far a reading reaches
 DESCRIPTION = """\
 Make a map of the soil from the rows of a drive with positions: its parameters
-with uncertainty, where the soil changes, and for a rover the probability of
+with uncertainty, where the soil changes, and for its rover the probability of
 climbing, the slip that slopes need, and the work of the wheels.
 
   soilml drive map ROVER.toml DRIVE.csv --out map
@@ -21,7 +21,7 @@ DRIVE.csv has x_m, y_m, slip, torque_Nm and load_N; several wheels also wheel
 and time_s. Positions are those of the wheel's contact, or those of the rover's
 origin where heading_rad and [rover.wheels] say where the wheels are.
 
-ROVER.toml has [gear], [soil], [soil.prior], [noise], and [rover] for slopes.
+ROVER.toml has [gear], [soil], [soil.prior], [noise] and [rover].
 The soil is estimated by the released file for wheels of any size, or by that
 of --from, in stretches between changes that `SoilTracker` finds. A Gaussian
 process over position joins them.
@@ -37,7 +37,6 @@ ARGUMENTS = (
     ("--slope DEG,...", "slopes in degrees (default: 0,5,10,15)"),
     ("--cell M", "side of a cell (default: 0.5)", SIZE),
     ("--reach M", "distance from a reading up to which the soil is known (default: 2)", SIZE),
-    ("--epsg CODE", "projected system of x and y, for map.tif", whole_number_from(1024, 32766)),
     "effects",
     "rows",
     ("--out FOLDER", "folder for the files"),
@@ -64,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.onboard.estimator import Estimator
     from soilml.optional_imports import need
     from soilml.soil_maps.local_soils import NEEDED
-    from soilml.soil_maps.workflow import CELL, FILES, REACH, SLOPES, soil_map
+    from soilml.soil_maps.workflow import CELL, REACH, SLOPES, soil_map
 
     if args.out is not None:
         need("tifffile", "drive map --out", "map")
@@ -87,8 +86,7 @@ def run(args: argparse.Namespace) -> int:
     report = found.report()
     if args.out is not None:
         folder = Path(args.out)
-        files = found.files(folder, args.epsg, report.pictures[0].save)
-        earlier = [folder / name for name in FILES if folder / name not in files]
-        write_files(files, folders=[folder], remove=[p for p in earlier if p.exists()])
+        files = found.files(folder, report.pictures[0].save)
+        write_files(files, folders=[folder])
     show_result(report, found.as_json())
     return 0

@@ -28,11 +28,8 @@ values and the reason in the column `status`; it is an error if no row has an
 equilibrium. The mean of a [remainder] of MODEL.toml is added; --std gives its
 uncertainty.
 --efficiency adds tractive efficiency (1 - s) r DP/T, and pull efficiency with
-its class (Comin and Saaj 2017, eq. 32). --balance adds how a track stands:
-shares of the load, trim, sinkage of the rear wheel, tension.
+its class (Comin and Saaj 2017, eq. 32).
 """
-
-MOST_BALANCED = 2000  # Most rows of --balance, whose integrals take some 50 kB each
 ARGUMENTS = (
     ("model MODEL.toml", "gear, soil and effects", InputFile),
     ("--slip S,...", "slip ratios, above 0 driving, below 0 braking", REQUIRED),
@@ -45,7 +42,6 @@ ARGUMENTS = (
     ("--run NAME", "add a first column `run` with this name", {"dest": "label"}),
     ("--std", "add the std of the model's error from [remainder]"),
     ("--efficiency", "add tractive efficiency and pull efficiency"),
-    ("--balance", "add how a track stands: shares of the load, trim"),
     ("--out FILE.csv", "write the table to this file", OutputFile),
     ("--picture FILE.png", "draw the columns against slip", OutputFile),
 )
@@ -67,7 +63,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.table import fault_of_text
     from soilml.physics.operating_point import Operating
     from soilml.row_status import Status
-    from soilml.systems.tracked_robot.robot import balanced_rows
 
     if args.label is not None and (fault := fault_of_text(args.label)):
         raise InputError(f"--run: {fault}")
@@ -77,11 +72,10 @@ def run(args: argparse.Namespace) -> int:
     )
     if args.std and case.remainder is None:
         raise InputError(f"--std: {args.model} has no [remainder]; soilml gap learns one")
-    most = MOST_BALANCED if args.balance else ROWS.most
-    if slips.size * loads.size > most:
+    if slips.size * loads.size > ROWS.most:
         raise InputError(
             f"{slips.size} slips and {loads.size} loads are {slips.size * loads.size} rows; "
-            f"at most {most} are possible{' with --balance' if args.balance else ''}"
+            f"at most {ROWS.most} are possible"
         )
     slip, load = (grid.ravel() for grid in np.meshgrid(slips, loads))
     angle = None if args.slip_angle is None else np.deg2rad(args.slip_angle)
@@ -100,8 +94,6 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             f"no row has an equilibrium; {worst.reason}{limit}: change --load or the soil"
         )
-    if args.balance:
-        rows = balanced_rows(case, rows)
     write_columns(rows.columns, args.out, args.picture, _picture(rows, loads.size))
     for line in ignored_discrepancy(case, "simulate", "the rows have no error of the model"):
         print(line, file=sys.stderr)
@@ -116,6 +108,4 @@ def _picture(rows: Table, loads: int) -> Picture:
 
     panels: list[tuple[str, ...]] = [("torque_Nm",), ("drawbar_pull_N",), ("sinkage_m",)]
     panels += [(name,) for name in ("tractive_efficiency", "pull_efficiency") if name in rows]
-    if "trim_rad" in rows:
-        panels += [("front_share", "belt_share", "rear_share"), ("trim_rad",), ("rear_sinkage_m",)]
     return column_picture(rows.columns, "slip", panels, ("load_N",) if loads > 1 else ())

@@ -19,8 +19,8 @@ and [drive]: torque_per_ampere, the friction of the drives and their errors.
 DRIVE.csv has a row for each time and wheel: time_s, wheel (a name in
 [rover.wheels]), rim_speed_m_s or wheel_speed_rad_s, torque_Nm or current_A,
 and slope_rad, the pitch, positive uphill. Optional are roll_rad (positive
-where the left side is higher), load_N and commanded_speed_m_s. Without load_N,
-the loads follow from mass and positions.
+where the left side is higher) and load_N. Without load_N, the loads follow
+from mass and positions.
 
 All wheels share one body speed, at which they pull what the slope requires.
 Torques weigh the soils of the prior. The result has a row for each time;

@@ -19,9 +19,10 @@ to the pulls.
   soilml paper track MODEL.toml LOG.csv --mass 130 --grousers 0.05,0.01,0.97,0.1
 
 MODEL.toml has the track, the soil, and [soil.prior] for what is to be fitted.
-LOG.csv has rows of run, time_s, belt_travel_m, travel_m (both m since the
-start) and tension_N, of both tracks; and front_laser_m, rear_laser_m and
-inclination_rad (tail down) where they were measured, --spacing apart.
+LOG.csv has rows of run, belt_travel_m, travel_m (both m since the start) and
+tension_N, of both tracks; and front_laser_m, rear_laser_m and inclination_rad
+(tail down) where they were measured, --spacing apart. Its rows are evenly
+spaced in time.
 
 A row of the output is a run: slip, pull of one track, sinkage, what the model
 predicts of them, and the angles at which the belt meets and leaves the soil

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from soilml.cli.option_values import NumberFrom
 from soilml.cli.options import OutputFile
 from soilml.errors import InputError
 
@@ -29,9 +28,8 @@ the last full turn, and the sinkage at midstance. Without --slip the wheel
 rolls freely. The picture shows the row's values against legs, stiffness or
 slip, that of them which has three values or more.
 
-The stress is proportional to the depth: --offset adds the stress at the
-surface. Neighbouring legs do not act on each other, and the body is a plate
-below the hub.
+The stress is proportional to the depth. Neighbouring legs do not act on each
+other, and the body is a plate below the hub.
 """
 ARGUMENTS = (
     ("--foot A,B,... (LTF)", "feet"),
@@ -39,9 +37,6 @@ ARGUMENTS = (
     ("--ground A,B,...", "soils of table I (default: all four)"),
     ("--stiffness K,...", "stiffnesses in N/m^3, in place of --ground"),
     ("--slip S,...", "commanded slips; without it the wheel rolls freely"),
-    ("--offset", "with the stress at the surface"),
-    ("--mass KG", "carried (default: 3.75 kg)", NumberFrom(0.01, 1e5, "kg")),
-    ("--angular-speed RAD_S", "default: 0.3 rad/s", NumberFrom(1e-3, 100.0, "rad/s")),
     ("--out FILE.csv", "write the table to this file", OutputFile),
     ("--picture FILE.png", "draw the values against legs, stiffness or slip", OutputFile),
 )
@@ -66,10 +61,8 @@ def run(args: argparse.Namespace) -> int:
             raise InputError(
                 f"--slip is {slip:g}; needed is 1 - v/(r omega), between -1 and 1, not per cent"
             )
-    given = {"mass": args.mass, "speed": args.angular_speed}
-    changes = {name: value for name, value in given.items() if value is not None}
     with working("simulating the walks"):
-        found = walk_table(feet, counts.astype(int).tolist(), _grounds(args), slips, **changes)
+        found = walk_table(feet, counts.astype(int).tolist(), _grounds(args), slips)
     drawn = None if args.picture is None else walk_picture(found)
     write_columns(found, args.out, args.picture, drawn)
     status = found["status"]
@@ -80,21 +73,15 @@ def run(args: argparse.Namespace) -> int:
 
 def _grounds(args: argparse.Namespace) -> dict[str, LinearGround]:
     """The grounds of --ground or --stiffness, by name."""
-    from dataclasses import replace
-
     from soilml.cli.option_values import parse_names, parse_numbers
     from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
 
     if args.stiffness is not None:
-        if args.ground is not None or args.offset:
-            raise InputError(
-                "--stiffness is in place of --ground, and has no stress at the surface"
-            )
+        if args.ground is not None:
+            raise InputError("--stiffness is in place of --ground: give one of them")
         values = parse_numbers("--stiffness", args.stiffness).tolist()
         return {f"{value:g}": LinearGround(stiffness=value) for value in values}
     names = [name.upper() for name in parse_names(args.ground) or GROUNDS]
     if unknown := [name for name in names if name not in GROUNDS]:
         raise InputError(f"no ground {unknown[0]!r}; there are: {', '.join(GROUNDS)}")
-    return {
-        name: GROUNDS[name] if args.offset else replace(GROUNDS[name], offset=0.0) for name in names
-    }
+    return {name: GROUNDS[name] for name in names}

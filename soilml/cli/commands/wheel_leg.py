@@ -29,11 +29,11 @@ the error that all strides on a soil share (table VIII).
 The last row of each soil has k_phi and the pull efficiency of a wheel of a
 300 kg rover (eq. 32) with its class. n, cohesion and shear modulus, which
 strides do not show, are uniform over the four soils of the source, unless
---assume has them. --wheel has another wheel.
+--assume has them.
 
 On a known soil the same relations give the slip of each stride:
 
-  soilml paper wheel-leg STRIDES.csv --known SSC-2 --torque-model empirical
+  soilml paper wheel-leg STRIDES.csv --known SSC-2
   soilml paper wheel-leg STRIDES.csv --known 35.8,22000   degrees, Pa 1 cm deep
 
 The relations are of one wheel-leg: five legs, Load Testing Feet, 3.75 kg. For
@@ -43,10 +43,7 @@ SENSORS = {"torque_Nm": "torque", "vibration_m_s2": "vibration", "sinkage_m": "s
 ARGUMENTS = (
     ("runs STRIDES.csv", "strides: CSV, Parquet or .xlsx", InputFile),
     ("--assume NAME=VALUE,...", "n, cohesion (Pa) or shear_modulus (m) where they are known"),
-    ("--wheel R,B,N", "of the heavy rover: m, m and load in N (default: 0.15,0.18,490.5)"),
     ("--known SOIL", "name of table I, or degrees,Pa: give the slip on this soil"),
-    ("--torque-model NAME (simplified)", "with --known: terramechanics, empirical or simplified"),
-    ("--vibration-model NAME (linear)", "with --known: planar or linear"),
     "by",
     "ignore-extra",
     ("--out FILE.csv", "write the table to this file", OutputFile),
@@ -62,8 +59,6 @@ def run(args: argparse.Namespace) -> int:
     known = args.known is not None
     if known and args.by is not None:
         raise InputError("--by asks for a soil of each group; --known gives the slip of each row")
-    if not known and (args.torque_model, args.vibration_model) != ("simplified", "linear"):
-        raise InputError("--torque-model and --vibration-model need --known, a soil")
     need = ("run",) if known else ("run", "slip")
     table = read_table(args.runs, need, filled=need, ignore_extra=args.ignore_extra)
     return _slip(args, table) if known else _soil(args, table)
@@ -81,8 +76,7 @@ def _slip(args: argparse.Namespace, table: Table) -> int:
         SENSORS[name]: table[name] for name in ("torque_Nm", "vibration_m_s2") if name in table
     }
     columns = {"run": table["run"]} | ({"slip_measured": table["slip"]} if "slip" in table else {})
-    models = {"torque_model": args.torque_model, "vibration_model": args.vibration_model}
-    columns |= slip_of_strides(sensors, *_known_soil(args.known), **models)
+    columns |= slip_of_strides(sensors, *_known_soil(args.known))
     numbered = {**columns, "stride": np.arange(1, len(table) + 1)}
     panel = tuple(name for name in columns if name.startswith("slip") and not name.endswith("_std"))
     write_columns(columns, args.out, args.picture, column_picture(numbered, "stride", [panel]))
@@ -121,12 +115,12 @@ def _soil(args: argparse.Namespace, table: Table) -> int:
     from soilml.systems.wheel_legs import Mobility, StrideSoil, mobility, soil_of_strides
     from soilml.systems.wheel_legs.strides import stride_columns, stride_report
 
-    heavy = _heavy(args)
+    assumed = _assumed(args)
 
     def estimate(rows: Table) -> tuple[StrideSoil, Mobility]:
         readings = {sensor: rows[name] for name, sensor in SENSORS.items() if name in rows}
         soil = soil_of_strides(rows["slip"], readings)
-        return soil, mobility(soil, **heavy)
+        return soil, mobility(soil, known=assumed)
 
     found, failed = result_by_group(args, table, "estimating", estimate)
     columns: dict[str, list[Any]] = {}
@@ -139,22 +133,13 @@ def _soil(args: argparse.Namespace, table: Table) -> int:
     return 0
 
 
-def _heavy(args: argparse.Namespace) -> dict[str, Any]:
-    """Arguments of `mobility` by --assume and --wheel."""
-    from soilml.cli.option_values import named_numbers, parse_names, parse_numbers
-    from soilml.physics.gears import Wheel
-    from soilml.physics.operating_point import Operating
+def _assumed(args: argparse.Namespace) -> dict[str, float]:
+    """What is known of the soil by --assume."""
+    from soilml.cli.option_values import named_numbers, parse_names
     from soilml.systems.wheel_legs.strides import UNKNOWN
 
-    found: dict[str, Any] = {}
-    if assumed := parse_names(args.assume):
-        found["known"] = named_numbers(assumed, "--assume", "NAME=VALUE, such as n=0.7")
-        if found["known"].keys() - UNKNOWN.keys():
-            raise InputError(f"--assume is {args.assume!r}; needed are {', '.join(UNKNOWN)}")
-    if args.wheel is not None:
-        sizes = parse_numbers("--wheel", args.wheel).tolist()
-        if len(sizes) != 3 or min(sizes) <= 0.0:
-            raise InputError(f"--wheel is {args.wheel!r}; needed are radius, width and load")
-        found["wheel"] = Wheel(radius=sizes[0], width=sizes[1])
-        found["at"] = Operating(slip=0.2, load=sizes[2])
-    return found
+    given = parse_names(args.assume) or []
+    assumed = named_numbers(given, "--assume", "NAME=VALUE, such as n=0.7")
+    if assumed.keys() - UNKNOWN.keys():
+        raise InputError(f"--assume is {args.assume!r}; needed are {', '.join(UNKNOWN)}")
+    return assumed

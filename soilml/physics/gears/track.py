@@ -40,11 +40,10 @@ class Track:
     Load and forces are those of one track. References: Wang, Yan and Du, J. Terramechanics 77,
     2018, eqs. 1-9; Okello, Watany and Crolla, J. agric. Engng Res. 69, 1998. The trim angle comes
     from the balance of displacements, so that the centre of mass and the hitch follow from it.
-    Tensions at the joints are inner forces; that of the middle arc follows from its pressure and
-    radius (`soilml.systems.tracked_robot.track_balance`). While it brakes, shear reverses between
-    the nodes: forces are then accurate to some parts in a thousand, at worst in a hundred. Where
-    shear is many times the load, sinkage need not rise with the load. Not for belts stiff in
-    bending, road wheels between the end wheels, or turning.
+    Tensions at the joints are inner forces. While it brakes, shear reverses between the nodes:
+    forces are then accurate to some parts in a thousand, at worst in a hundred. Where shear is many
+    times the load, sinkage need not rise with the load. Not for belts stiff in bending, road wheels
+    between the end wheels, or turning.
     """
 
     name: ClassVar[str] = "track"

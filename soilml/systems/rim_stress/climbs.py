@@ -152,8 +152,8 @@ class Climb:
 class Uncertainty:
     """Standard deviations of the measurements on a climb, by the keys of [noise].
 
-    `speed_m_s` is the relative error of the speed of each run, `speed_scale` one common to all
-    runs; both wheels of a rover have its speed. `entry_angle_rad` is an error common to all runs,
+    `speed_m_s` is the relative error of the speed of each run, which both wheels of a rover have.
+    `entry_angle_rad` is an error common to all runs,
     due to size, sampling and deadband of the sensors. `front_load` is the relative error of the
     load on the front wheels.
     """
@@ -162,7 +162,6 @@ class Uncertainty:
     normal_Pa: Annotated[Noise, NoiseOfReading()] = _STRESS  # noqa: N815
     slope_rad: Annotated[float, _ANGLE] = 0.005
     entry_angle_rad: Annotated[float, _ANGLE] = 0.005  # about half a sample
-    speed_scale: Annotated[float, _SHARE] = 0.0
     front_load: Annotated[float, _SHARE] = 0.05
 
     def __post_init__(self) -> None:
@@ -265,18 +264,18 @@ class ForceBalances:
         """
         stds = np.asarray([balance_std(self.rover, c, shear, noise) for c in self.climbs])
         lower_limit = MIN_STD_FRACTION * self.rover.weight
-        covariance = np.diag(stds[:, 0] ** 2 + lower_limit**2) + stds[:, 1:] @ stds[:, 1:].T
+        covariance = np.diag(stds[:, 0] ** 2 + lower_limit**2) + np.outer(stds[:, 1], stds[:, 1])
         return np.linalg.inv(np.linalg.cholesky(covariance)), np.sqrt(np.diag(covariance))
 
 
 def balance_std(
     rover: Rover, climb: Climb, shear: ShearParameters, noise: Uncertainty
-) -> tuple[float, float, float]:
-    """Standard deviations of a climb's balance, N: (independent, by speed scale, by entry angle).
+) -> tuple[float, float]:
+    """Standard deviations of a climb's balance, N: (independent, by entry angle).
 
-    The first combines speed, slope, stress and front load of this run alone; the others come from
-    errors that all runs share, of the speed scale and of the entry angles. First order at the soil
-    `shear`: the effective variance of the balance. References: Orear, Am. J. Phys. 50(10), 1982.
+    The first combines speed, slope, stress and front load of this run alone; the other comes from
+    the error of the entry angles that all runs share. First order at the soil `shear`: the
+    effective variance of the balance. References: Orear, Am. J. Phys. 50(10), 1982.
     """
     cohesion, tangent, modulus = shear[0], float(np.tan(shear[1])), shear[2]
 
@@ -307,7 +306,7 @@ def balance_std(
         by_stress = 2.0 * scale * (pull - float(pull_ratio(parts, tangent)) * lift)
         independent.append(float(np.linalg.norm(by_stress * wheel.normal_std)))
     std = float(np.linalg.norm(independent))
-    return std, noise.speed_scale * by_speed, noise.entry_angle_rad * by_entry
+    return std, noise.entry_angle_rad * by_entry
 
 
 def _per_stress(

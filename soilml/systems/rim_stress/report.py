@@ -9,7 +9,6 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.numerics.quantiles import band_columns, quantile_band
-from soilml.quantities import SHEAR
 from soilml.remarks import Remark, about
 from soilml.report.column_figure import column_picture
 from soilml.report.report import Report
@@ -27,7 +26,6 @@ from soilml.systems.rim_stress.tables import ClimbData
 
 #: Fraction of samples whose slope still rises at the highest slip, above which a warning is given.
 MAX_STILL_RISING = 0.05
-ZERO_SLIP_SIGMAS = 2.0  # Slips within this many standard deviations of zero have no certain sign
 SLIPS = 9  # Slips of the curve in its table
 ENDS = ("exit", "entry", "centre")  # Angles that are compared
 
@@ -70,13 +68,11 @@ class ClimbingReport:
     def as_json(self) -> dict[str, Any]:
         """Soil, steepest slope, curve and climbs, in SI units."""
         fit, ability = self.ground.fit, self.ability
-        given = zip(SHEAR, self.ground.samples[0].tolist(), strict=True)
         found = band_columns("steepest_slope_rad", ability.steepest)
         found |= band_columns("slip_at_steepest", ability.steepest_slip)
         tables = {"curve": self.curve, "climbs": self.climbs}
         return {
             "soil": fit.as_json(),
-            "given": {name: value for name, value in given if name not in fit.names},
             **{name: float(value) for name, value in found.items()},
             **{
                 title: {name: np.asarray(values).tolist() for name, values in columns.items()}
@@ -87,7 +83,7 @@ class ClimbingReport:
     @property
     def warnings(self) -> tuple[Remark, ...]:
         """Limitations of the data and of the estimate."""
-        warnings, noise = list(self.ground.fit.warnings), self.ground.noise
+        warnings = list(self.ground.fit.warnings)
         if self.ability.fraction_still_rising > MAX_STILL_RISING:
             text = (
                 f"in {self.ability.fraction_still_rising:.0%} of the samples the slope still rises "
@@ -96,22 +92,13 @@ class ClimbingReport:
             )
             warnings.append(Remark("still-rising", text))
         steepest = float(quantile_band(self.ability.steepest).upper)
-        least = ZERO_SLIP_SIGMAS * np.hypot(noise.speed_m_s.share, noise.speed_scale)
-        climbs = self.data.climbs
-        steep = [c.name for c in climbs if c.slope > steepest]
+        steep = [c.name for c in self.data.climbs if c.slope > steepest]
         if steep:
             text = (
                 f"run {', '.join(steep)} climbed more than the predicted "
                 f"{np.rad2deg(steepest):.3g} deg at most: inconsistent with the others"
             )
             warnings.append(Remark("inconsistent", text, tuple(steep)))
-        zero = [c.name for c in climbs if any(abs(wheel.slip) < least for wheel in c.wheels)]
-        if zero:
-            text = (
-                f"slip is zero within its noise in run {', '.join(zero)}: the direction of the "
-                "shear displacement there is not known"
-            )
-            warnings.append(Remark("zero-slip", text, tuple(zero)))
         differ = [wheel for wheel, found in self.stress.items() if not found.equal]
         if differ:
             text = (

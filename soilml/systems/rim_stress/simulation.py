@@ -150,12 +150,11 @@ class SimulatedRover:
         self, rng: np.random.Generator, slopes: Sequence[float] = SLOPES, repeats: int = 4
     ) -> list[Climb]:
         """Each slope climbed `repeats` times, as measured by the sensors."""
-        scale = self.noise.speed_scale * rng.normal()
         climbs = []
         for slope in slopes:
             slip = self.slip_at(slope)
             for turn in range(repeats):
-                error = scale + self._speed_error(rng)
+                error = self._speed_error(rng)
                 front, rear = (self.measure(i, slip, slope, rng, error) for i in (0, 1))
                 name = f"{np.rad2deg(slope):.3g}deg_{turn + 1}"
                 reading = slope + self.noise.slope_rad * rng.normal()

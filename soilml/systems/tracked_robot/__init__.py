@@ -1,19 +1,12 @@
-"""A robot on two tracks: pull, belt tension, evaluation of sensor signals and soil parameters.
+"""A robot on two tracks: pull, evaluation of sensor signals and soil parameters.
 
-`TrackedRobot` predicts the drawbar pull, `track_balance` the distribution of the load along a belt,
-and `evaluate_log` goes from the log of pulls to the soil; `steady_pulls` gives its rows.
-Source: Wang, Yan and Du, J. Terramechanics 77, 2018.
+`TrackedRobot` predicts the drawbar pull, and `evaluate_log` goes from the log of pulls to the soil;
+`steady_pulls` gives its rows. Source: Wang, Yan and Du, J. Terramechanics 77, 2018.
 """
 
-from soilml.systems.tracked_robot.robot import (
-    DiscreteGrousers,
-    TrackedRobot,
-    grouser_pull,
-    track_balance,
-)
+from soilml.systems.tracked_robot.robot import DiscreteGrousers, TrackedRobot, grouser_pull
 from soilml.systems.tracked_robot.signals import (
     StationaryMean,
-    low_pass,
     rear_sinkage,
     slip_from_displacements,
     stationary_mean,
@@ -22,6 +15,5 @@ from soilml.systems.tracked_robot.track_log import TrackLog, evaluate_log, stead
 
 __all__ = [
     "DiscreteGrousers", "StationaryMean", "TrackLog", "TrackedRobot", "evaluate_log",
-    "grouser_pull", "low_pass", "rear_sinkage", "slip_from_displacements", "stationary_mean",
-    "steady_pulls", "track_balance",
+    "grouser_pull", "rear_sinkage", "slip_from_displacements", "stationary_mean", "steady_pulls",
 ]  # fmt: skip

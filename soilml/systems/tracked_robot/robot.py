@@ -1,21 +1,17 @@
-"""A robot on two tracks: drawbar pull, and the equilibrium of each track."""
+"""A robot on two tracks: its drawbar pull, also with discrete grousers."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from soilml.arrays import Floats
-from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.fitting.operating_points import operating_points
-from soilml.io.table import Table
 from soilml.physics.contact import stress
 from soilml.physics.effects import Effect, ShearSoftening, TrackGrousers
 from soilml.physics.gears import Track
-from soilml.physics.gears.track_belt import belt_arcs
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
@@ -118,77 +114,6 @@ def grouser_pull(
     each = pressed * (grousers.friction * mobilised * np.cos(angle) - np.sin(angle))
     bare = float(robot.pull(soil, slip, effects))
     return np.asarray(2.0 * each.sum(axis=1) + grousers.tip / grousers.pitch * bare)
-
-
-def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -> dict[str, Floats]:
-    r"""How a track stands in the soil, by names of columns, at operating points (...).
-
-    .. math::
-        T = b R_t \bar\sigma, \quad x = \frac{1}{W} \int (X - x) \, dW
-
-    A belt without bending stiffness on a circular arc has the tension b R_t sigma at every point;
-    since the pressure varies along the arc, the mean tension is returned. The trim angle follows
-    from the displacements of both wheels.
-
-    Parameters
-    ----------
-    model
-        A model with a track.
-    soil, at
-        Soil parameters, and slip and load of one track.
-    points
-        Points along the belt for the integrals.
-
-    Returns
-    -------
-    dict
-        Shares of the load under front wheel, belt and rear wheel; the trim, tail down (rad); the
-        sinkage of the rear wheel (m); the tension of the belt (N); the centre of pressure behind
-        the middle of the base (m). NaN without equilibrium.
-
-    Raises
-    ------
-    InputError
-        If the model has no track, and as the model itself.
-
-    References
-    ----------
-    Wang et al. 2018, eqs. 3, 8 and 9, in which the tensions at the joints cancel.
-    """
-    track = track_of(model)
-    belt = track.contact_geometry(model(soil, at).sinkage, soil, at)
-    profile = model.profile(soil, at, points)
-    _, middle, last = belt_arcs(belt)
-    step = last.distance(-belt.exit)[0] / (points - 1)
-    way = step * np.arange(points).reshape(-1, *[1] * np.ndim(step))
-    front, rear = way < middle.along, way > last.along
-    weight = np.full_like(way, 1.0) * step
-    weight[[0, -1]] *= 0.5
-    lift = profile.normal * np.cos(profile.angle) + profile.shear * np.sin(profile.angle)
-    carried = lift * weight
-    load = np.sum(carried, axis=0)
-    level = np.cos(profile.angle) * step
-    ahead = np.cumsum(level, axis=0) - 0.5 * (level + level[:1])  # behind the entry
-    below_front = track.radius * np.sin(belt.entry)
-    centre = np.sum(ahead * carried, axis=0) / load - below_front
-    length = belt.arc_radius * (belt.leave + belt.meet)
-    pressure = np.sum(profile.normal * weight * ~(front | rear), axis=0) / length
-    return {
-        "front_share": np.sum(carried * front, axis=0) / load,
-        "belt_share": np.sum(carried * ~(front | rear), axis=0) / load,
-        "rear_share": np.sum(carried * rear, axis=0) / load,
-        "trim_rad": belt.trim,
-        "rear_sinkage_m": belt.rear,
-        "belt_tension_N": track.width * belt.arc_radius * pressure,
-        "pressure_centre_m": centre - 0.5 * track.base * np.cos(belt.trim),
-    }
-
-
-def balanced_rows(case: Case, table: Table) -> Table:
-    """Simulated rows with what `track_balance` says of each."""
-    columns = table.columns | track_balance(case.model, case.soil, operating_points(table))
-    columns["status"] = columns.pop("status")  # the last, as in every table
-    return replace(table, columns=columns)
 
 
 def track_of(model: Model) -> Track:

@@ -1,8 +1,8 @@
 """Evaluation of a tracked robot's sensor signals: slip, sinkage and mean pull.
 
-Displacements, pulls and laser distances sampled at one rate are filtered, averaged over their
-stationary part, and converted to slip and sinkage. Source: Wang, Yan and Du, J. Terramechanics 77,
-2018, sections 3 and 4.1.
+Displacements, pulls and laser distances sampled at one rate are averaged over their stationary
+part, and converted to slip and sinkage. Source: Wang, Yan and Du, J. Terramechanics 77, 2018,
+sections 3 and 4.1.
 """
 
 from __future__ import annotations
@@ -14,11 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from soilml.arrays import Floats
-from soilml.errors import FitError, InputError, MissingLibraryError
+from soilml.errors import FitError, InputError
 
-PADDING = 9  # Samples by which a signal is extended at its ends before it is filtered
-#: Lowest cutoff as a fraction of the sampling rate; below it the coefficients lose their digits.
-MIN_CUTOFF = 1e-5
 #: Blocks into which a signal is divided, and the fewest consecutive ones of a stationary part.
 BLOCKS, MIN_BLOCKS = 40, 8
 #: Robust standard deviations from the median at which a block mean is an outlier.
@@ -34,31 +31,6 @@ class StationaryMean:
     std_error: float
     start: int
     stop: int
-
-
-def low_pass(signal: ArrayLike, rate: float, cutoff: float) -> Floats:
-    r"""Filter a signal (n,) sampled at `rate` (Hz) by a low-pass without delay.
-
-    .. math:: |H(f)|^2 = \frac{1}{1 + \Omega^4}, \quad
-        \Omega = \frac{\tan(\pi f / f_s)}{\tan(\pi f_c / f_s)}
-
-    A second-order Butterworth filter with `cutoff` (Hz), applied forwards and backwards, so that
-    the amplitude at the cutoff is halved. The source states a low-pass only; order and cutoff are
-    our choice. Raises `InputError` for a signal with gaps, or a cutoff out of range. References:
-    Butterworth 1930; Gustafsson, IEEE Trans. Signal Proc. 44(4), 1996.
-    """
-    x = _check_signal(signal, "signal", PADDING + 1)
-    if not MIN_CUTOFF * rate <= cutoff < 0.5 * rate:
-        raise InputError(
-            f"cutoff is {cutoff:g} Hz at a rate of {rate:g} Hz; it must lie below half of that, "
-            f"and above {MIN_CUTOFF * rate:g} Hz, where the filter is accurate"
-        )
-    try:
-        from scipy.signal import butter, filtfilt
-    except ImportError:
-        raise MissingLibraryError("low_pass needs scipy: pip install '.[ground]'") from None
-    b, a = butter(2, cutoff, fs=rate)
-    return np.asarray(filtfilt(b, a, x, padlen=PADDING), dtype=np.float64)
 
 
 def stationary_mean(signal: ArrayLike, above: float = -math.inf) -> StationaryMean:
@@ -124,7 +96,8 @@ def rear_sinkage(rear: ArrayLike, front: ArrayLike, angle: ArrayLike, spacing: f
     which prints l_r twice; the second must be the front reading, or a level robot on undisturbed
     ground would have a sinkage.
     """
-    l_r, l_f, delta = (np.asarray(x, dtype=np.float64) for x in (rear, front, angle))
+    names = ("rear", "front", "inclination")
+    l_r, l_f, delta = map(_check_signal, (rear, front, angle), names, (1, 1, 1))
     if not (most := float(np.abs(delta).max())) < 0.5 * math.pi:
         raise InputError(f"the inclination reaches {most:g}; needed is an inclination in rad")
     return np.asarray(l_r + spacing * np.sin(delta) - l_f)

@@ -27,7 +27,6 @@ from soilml.systems.tracked_robot.robot import (
     track_of,
 )
 from soilml.systems.tracked_robot.signals import (
-    low_pass,
     rear_sinkage,
     slip_from_displacements,
     stationary_mean,
@@ -35,10 +34,9 @@ from soilml.systems.tracked_robot.signals import (
 
 #: Columns of a log: travel of the belt and of the robot (m), tension of the gauge between robot and
 #: payload (N); further ones of the laser distances (m) and the inclination, tail down (rad).
-LOG = ("run", "time_s", "belt_travel_m", "travel_m", "tension_N")
+LOG = ("run", "belt_travel_m", "travel_m", "tension_N")
 LASERS = ("front_laser_m", "rear_laser_m", "inclination_rad")
-#: Cutoff of the low-pass of the lasers, Hz; windows of the stationary part whose slips scatter.
-CUTOFF, WINDOWS = 2.0, 8
+WINDOWS = 8  # Windows of the stationary part whose slips scatter
 POINTS = 401  # Points along the belt
 #: Columns of each panel of the picture; the last has figure 8 of the source.
 PANELS = (
@@ -165,8 +163,7 @@ def steady_pulls(log: Table, load: float, spacing: float | None = None) -> Table
                 "drawbar_pull_N_std": 0.5 * steady.std_error,
             }
             if with_lasers and spacing is not None:
-                rate = 1.0 / float(np.median(np.diff(rows["time_s"])))
-                front, rear, angle = (low_pass(rows[k], rate, CUTOFF)[part] for k in LASERS)
+                front, rear, angle = (rows[k][part] for k in LASERS)
                 row["rear_sinkage_m"] = float(rear_sinkage(rear, front, angle, spacing).mean())
         except (FitError, InputError) as error:
             raise TableError(f"{log.source}, run {name}: {error}") from None

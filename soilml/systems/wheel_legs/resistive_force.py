@@ -67,8 +67,8 @@ class LinearGround:
 
     .. math:: \sigma(z) = \sigma_0 + \alpha_z z, \qquad \sigma_1 = \sigma_0 + \alpha_z \cdot 1 cm
 
-    References: Comin and Saaj 2017, eq. 3 and table I. Resistive-force theory, eq. 4, has no
-    offset: its stress is proportional to depth.
+    References: Comin and Saaj 2017, eq. 3 and table I. Walks are by resistive-force theory, eq. 4,
+    which has no offset: its stress is proportional to depth.
     """
 
     stiffness: Annotated[float, Parameter("N/m^3", 1.0, 1e9, "alpha_z(0, pi/2)")]
@@ -202,8 +202,6 @@ def wheel_leg(foot: str = "LTF", **changes: Any) -> WheelLeg:
     return WheelLeg(foot=FEET[foot], **changes)
 
 
-#: Depth over which the offset of the normal stress builds up, m, so that the force is continuous.
-SKIN = 0.001
 #: Speed below which the direction of motion is regularised, as a fraction of the speed of the leg's
 #: end: 1 mm/s for the paper's wheel-leg.
 FADING = 0.02
@@ -221,7 +219,6 @@ class WalkingLegs:
     turns: Array  # 1 for plates that turn with the wheel, 0 for the body
     speed: Array  # rad/s
     stiffness: Array  # N/m^3
-    offset: Array  # Pa
     mass: Array  # kg
     tip_speed: Array  # m/s, of the leg's end about the hub
     legs: Array
@@ -244,7 +241,6 @@ class WalkingLegs:
             turns=turns,
             speed=np.array([w.speed for w in wheels], float),
             stiffness=np.array([g.stiffness for g in grounds], float),
-            offset=np.array([g.offset for g in grounds], float),
             mass=np.array([w.mass for w in wheels], float),
             tip_speed=np.array([w.speed * w.leg.length for w in wheels], float),
             legs=np.array([w.legs for w in wheels]),
@@ -293,9 +289,8 @@ class WalkingLegs:
         vx, vz = ahead + turning * z, up - turning * x
         pace = np.sqrt(vx * vx + vz * vz + (FADING * self.tip_speed) ** 2)
         ux, uz = vx / pace, vz / pace
-        skin = np.exp(-np.maximum(depth, 0.0) / SKIN)
-        pressure = area * (self.stiffness * depth + self.offset * (1.0 - skin))
-        gradient = area * (self.stiffness + self.offset / SKIN * skin)
+        gradient = area * self.stiffness
+        pressure = gradient * depth
         rest_x, rest_z, xx, xz, zx, zz = resistance_terms(c2, s2)
         sx, sz = rest_x - xx * ux - xz * uz, rest_z - zx * ux - zz * uz
         fx, fz = pressure * sx, pressure * sz

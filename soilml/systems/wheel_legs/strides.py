@@ -26,9 +26,7 @@ from soilml.systems.wheel_legs.stride_relations import (
     GRAVITY,
     SINKAGE_RANGE,
     TORQUE,
-    TORQUE_SLIP,
     VIBRATION,
-    VIBRATION_SLIP,
     LegSoil,
     soil_of_sinkage,
 )
@@ -164,8 +162,6 @@ def mobility(
     soil: StrideSoil,
     *,
     known: Mapping[str, float] | None = None,
-    wheel: Wheel = HEAVY_WHEEL,
-    at: Operating = HEAVY_AT,
     seed: int = 0,
 ) -> Mobility:
     r"""Pull efficiency of a heavy wheel on the soil that strides were fused to, with its class.
@@ -195,7 +191,7 @@ def mobility(
     others |= {name: np.full(DRAWS, value) for name, value in known.items()}
     kphi = sigma / 0.01 ** others["n"]
     ground = Soil(friction_angle=angle, kc=np.zeros(DRAWS), kphi=kphi, **others)
-    efficiency = np.asarray(pull_efficiency(Model(wheel), ground, at))
+    efficiency = np.asarray(pull_efficiency(Model(HEAVY_WHEEL), ground, HEAVY_AT))
     classes = traffic_class(efficiency)
     carried = np.nan_to_num(efficiency, nan=-1.0)
     return Mobility(
@@ -277,23 +273,19 @@ def slip_of_strides(
     readings: Mapping[str, Floats],
     friction_angle: float,
     normal_stiffness: float,
-    *,
-    torque_model: str = "simplified",
-    vibration_model: str = "linear",
 ) -> dict[str, Floats]:
     """Slip by the printed relations on a soil of this angle (rad) and stiffness sigma_1 (Pa).
 
     readings: `torque` (N m) and `vibration` (m/s^2) of each stride (n,), or one of them; NaN where
         not measured.
-    torque_model, vibration_model: Names in `TORQUE_SLIP` and `VIBRATION_SLIP`.
 
     Returns: Columns (n,): slip_by_torque, slip_by_vibration and, fused by their variances, slip,
         with standard deviations; NaN where nothing was measured. `in_range` says whether the fused
         slip is one for which the relations were fitted.
 
-    Raises `InputError` for an unknown model, and where nothing was measured. References: Comin and
-    Saaj 2017, eqs. 18, 24, 26 and 28, tables IV to VII. The error of the relations is that of table
-    VI, as for independent errors; on another soil or wheel-leg it is larger.
+    Raises `InputError` where nothing was measured. References: Comin and Saaj 2017, eqs. 19, 24, 26
+    and 28, tables IV to VII, simplified and linear. The error of the relations is that of table VI,
+    as for independent errors; on another soil or wheel-leg it is larger.
 
     Examples
     --------
@@ -303,11 +295,7 @@ def slip_of_strides(
     [0.24, 0.1, 0.17, 0.1]
     """
     columns: dict[str, Floats] = {}
-    asked = (("torque", torque_model, TORQUE_SLIP), ("vibration", vibration_model, VIBRATION_SLIP))
-    for name, model, catalogue in asked:
-        if model not in catalogue:
-            raise InputError(f"no slip model {model!r}; there are: {', '.join(catalogue)}")
-        relation = catalogue[model]
+    for name, relation in (("torque", TORQUE), ("vibration", VIBRATION)):
         if name in readings and np.isfinite(value := np.asarray(readings[name], float)).any():
             a, b = relation.line(friction_angle, normal_stiffness)
             columns[f"slip_by_{name}"] = np.asarray(a + b * value)

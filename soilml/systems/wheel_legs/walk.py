@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -23,17 +22,11 @@ from soilml.systems.wheel_legs.resistive_force import (
 
 GRAVITY = 9.81
 TOLERANCE = 1e-6  # A step has converged when the forces balance to this fraction of the weight
-#: Newton iterations of a step, and halvings of one Newton update that does not reduce the
-#: imbalance.
-MAX_NEWTON_STEPS, MAX_HALVINGS = 25, 8
+MAX_NEWTON_STEPS = 25
 #: Largest change of velocity by a Newton update, as a fraction of the speed of the leg's end: the
 #: force is a function of the direction of motion and nearly singular at rest.
 MAX_UPDATE = 0.3
-#: How often a step that does not converge is halved, and a step with an abrupt change of velocity.
-MAX_BISECTIONS, MAX_ABRUPT_BISECTIONS = 16, 5
-#: Change of the vertical velocity that counts as abrupt (a fall or an impact), as a fraction of the
-#: speed of the leg's end.
-ABRUPT_CHANGE = 0.2
+MAX_BISECTIONS = 16  # How often a step that does not converge is halved
 HALVINGS = 40  # Bisection steps for the height of the hub at the start
 
 
@@ -232,15 +225,14 @@ def implicit_step(
 
     .. math:: M (v' - v) / dt = F(v', z + v'_z dt) - M g
 
-    is solved by a damped Newton method in both velocities. Cases that do not converge, or whose
-    velocity changes abruptly, take the step in two halves, recursively (`depth`). A case with a
-    commanded slip has its horizontal velocity prescribed.
+    is solved by a damped Newton method in both velocities. Cases that do not converge take the step
+    in two halves, recursively (`depth`). A case with a commanded slip has its horizontal velocity
+    prescribed.
 
     Returns hubs (4, cases), forces (3, cases) at the end, and whether they balance there, (cases,).
     """
     end, forces, converged = _newton(legs, hub, start, stop)
-    abrupt = np.abs(end[3] - hub[3]) > ABRUPT_CHANGE * legs.tip_speed
-    repeated = np.flatnonzero(~converged | (abrupt & (depth < MAX_ABRUPT_BISECTIONS)))
+    repeated = np.flatnonzero(~converged)
     if repeated.size and depth < MAX_BISECTIONS:
         middle, some = 0.5 * (start + stop), legs.select(repeated)
         halfway, _, first = implicit_step(some, hub[:, repeated], start, middle, depth + 1)
@@ -284,14 +276,8 @@ def _newton(legs: WalkingLegs, hub: Array, start: float, stop: float) -> tuple[A
         length = np.maximum(np.hypot(*update), 1e-300)
         share = np.minimum(1.0, MAX_UPDATE * legs.tip_speed / length)
         share = np.where(norm < TOLERANCE, 0.0, share)
-        for halving in range(MAX_HALVINGS):
-            trial = imbalance(v + share * update)
-            worse = ~(trial[1] < norm) & (share > 0.0)
-            if halving == MAX_HALVINGS - 1 or not np.any(worse):
-                break
-            share = np.where(worse, 0.5 * share, share)
         v = v + share * update
-        residual, norm, forces, rates = trial
+        residual, norm, forces, rates = imbalance(v)
     return np.concatenate([hub[:2] + v * dt, v]), forces, norm < TOLERANCE
 
 
@@ -332,14 +318,12 @@ def walk_table(
     grounds: Mapping[str, LinearGround],
     slips: Sequence[float],
     turns: float = 2.0,
-    **changes: Any,
 ) -> dict[str, Array]:
     """Walk with every combination of foot, legs, ground and commanded slip (NaN: free).
 
-    `grounds` are by name; one that is named by its stiffness has no other name. `changes` are
-    further fields of `WheelLeg`, such as its mass. Returns columns with a row for each walk: what
-    was asked for, `gait_metrics`, and its status. Raises `InputError` for an unknown foot, an
-    invalid wheel-leg, and too many walks.
+    `grounds` are by name; one that is named by its stiffness has no other name. Returns columns
+    with a row for each walk: what was asked for, `gait_metrics`, and its status. Raises
+    `InputError` for an unknown foot, an invalid wheel-leg, and too many walks.
     """
     cases = list(product(feet, legs, grounds, slips))
     if len(cases) > MOST:
@@ -347,7 +331,7 @@ def walk_table(
     foot, count, under, slip = (np.asarray(part) for part in zip(*cases, strict=True))
     stiffness = np.asarray([grounds[name].stiffness for name in under])
     walked = walk(
-        [wheel_leg(foot, legs=count, **changes) for foot, count, _, _ in cases],
+        [wheel_leg(foot, legs=count) for foot, count, _, _ in cases],
         [grounds[name] for name in under],
         slip=slip.astype(float),
         turns=turns,

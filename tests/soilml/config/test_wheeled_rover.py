@@ -87,6 +87,7 @@ def test_the_section_is_read_and_written_back(model_file):
     ("old", "new", "said"),
     [
         ("mass = 30", "mas = 30", "did you misspell it as 'mas'"),
+        (ROVER, "[rover]\nradius = 0.1", "four equal wheels is for soilml paper climb"),
         ("mass = 30", "mass = -1", "mass is -1 kg; it must lie between 0.01 and 100000"),
         ("[0.05, 0.0, 0.3]", "[0.05, 0.3]", r"centre_of_mass is \[0.05, 0.3\]; needed is"),
         ("[0.05, 0.0, 0.3]", "[0.05, 0.0, 300]", "height. in m, up to 100"),

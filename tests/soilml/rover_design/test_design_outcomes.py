@@ -89,9 +89,7 @@ def test_shares_of_a_margin_that_is_known(study):
     angle, contact = worlds.soil["friction_angle"], worlds.errors["contact"]
     margin = 3.0 * (angle - angle.mean()) / angle.std() + contact / contact.std()
     none = np.zeros((1, worlds.count))
-    outcome = Outcomes(
-        margin[None], none, none, none, none, np.full_like(none, np.nan), none, none > 0
-    )
+    outcome = Outcomes(margin[None], none, none, none, none, none, none > 0)
     shares = {one.inputs[0]: one.share for one in variance_shares(worlds, outcome)}
     assert shares["friction_angle"] == pytest.approx(0.9, abs=0.02)
     assert shares["contact"] == pytest.approx(0.1, abs=0.02)

@@ -21,7 +21,6 @@ def designs_of(width, margin, probability):
     results = {
         "probability": np.asarray(probability),
         "margin_at_risk_N": np.asarray(margin),
-        "lugs_needed": np.full(len(width), np.nan),
     }
     return Designs({"width": np.asarray(width)}, results)
 

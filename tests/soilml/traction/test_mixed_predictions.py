@@ -56,12 +56,12 @@ def test_the_error_fades_to_zero_mean_and_a_usual_size_in_every_direction(drawn)
     slip = np.asarray([0.3, 0.3, 0.3, 0.95])
     load = np.asarray([60.0, 4.0, 900.0, 60.0])
     found = drawn.with_errors(slip, load.tolist(), ("drawbar_pull",))
-    error, before = (draws.errors for draws in found)
+    error = found[0].errors
     draw = np.arange(len(drawn.draws.values))
     at = [error.at("drawbar_pull", "", draw, np.full(draw.size, s), np.full(draw.size, w))
           for s, w in zip(slip, load, strict=True)]  # fmt: skip
     std, mean = np.std(at, axis=1), np.mean(at, axis=1)
-    assert (std[1:] > std[0]).all() and before.amplitude("drawbar_pull") > std[0]
+    assert (std[1:] > std[0]).all()
     assert (np.abs(mean[1:]) < 0.2 * std[1:]).all()
 
 
