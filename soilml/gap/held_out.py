@@ -20,6 +20,7 @@ from soilml.inference.evidence import LinearisedFit
 from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import Hyperparameters, scatter_columns, terms_like
 from soilml.inference.posterior import Names, Posterior
+from soilml.inference.search import SOIL_STARTS
 from soilml.io.table import Table
 from soilml.quantities import column
 from soilml.remarks import Remark
@@ -198,8 +199,10 @@ def plain_soil(posterior: Posterior) -> Solution:
     """The soil alone, fitted under noise and scatter, without remainder."""
     soil = posterior.soil.fit
     problem = soil.whitened_by(posterior.whiten).problem
-    nominal = np.asarray([c.prior.fraction(c.nominal) for c in soil.coordinates])
-    begun = [descent_if_any(problem, soil.x, soil.linearisation), descent_if_any(problem, nominal)]
+    elsewhere = [np.asarray([c.prior.fraction(c.nominal) for c in soil.coordinates])]
+    elsewhere += [np.full(len(soil.x), x) for x in SOIL_STARTS]
+    begun = [descent_if_any(problem, soil.x, soil.linearisation)]
+    begun += [descent_if_any(problem, start) for start in elsewhere]
     carried = [f for f in begun if f is not None and np.isfinite(f.prediction).all()]
     stays = soil.whitened_by(posterior.whiten)
     return min(carried, key=lambda fit: fit.objective, default=stays)
