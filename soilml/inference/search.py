@@ -42,8 +42,6 @@ Booleans = NDArray[np.bool_]
 
 #: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
 SOIL_STARTS = (0.5, 0.25)
-#: Largest distance of coordinates within which coarse fits are at one optimum.
-SAME_OPTIMUM = 0.1
 #: Share of the distance from the middle of its prior at which a soil parameter starts again: one at
 #: a bound would stay there.
 INWARD = 0.8
@@ -117,11 +115,7 @@ class Search:
         self.terms = gaussian_terms(
             readings, problem.case, scatter_columns(best.fitted(), readings)
         )
-        kept: list[Solution] = []
-        for f in sorted(carried, key=lambda fit: fit.objective):
-            apart = all(np.abs(f.x - other.x).max() > SAME_OPTIMUM for other in kept)
-            if apart and f.objective < best.objective + constants.NEAR_AT_FIRST:
-                kept.append(f)
+        kept = [f for f in carried if f.objective < best.objective + constants.NEAR_AT_FIRST]
         first = self.terms.first()
         jobs = [
             StartedFit(SOIL_ALONE, f.start_values(), first, none, f.linearisation) for f in kept
