@@ -171,7 +171,7 @@ def check_number(path: str, parameter: Parameter, value: Any) -> None:
         return
     numbers = as_numbers(path, value)
     bad = ~((numbers >= parameter.lower) & (numbers <= parameter.upper))
-    if np.any(bad):
+    if bad.any():
         worst = float(numbers[bad].flat[0]) if numbers.ndim else float(numbers)
         raise InputError(
             f"{path} is {worst:g} {unit_text(parameter.unit)}".rstrip()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -67,8 +68,12 @@ class Whitening:
         white = (self.noise * values.T).T if independent else self.noise @ values
         if not self.basis.shape[1]:
             return np.asarray(white)
-        shrunk = (self.shrinkage * (self.basis.T @ white).T).T
+        shrunk = (self.shrinkage * (self._transposed @ white).T).T
         return np.asarray(white - self.basis @ shrunk)
+
+    @cached_property
+    def _transposed(self) -> Any:
+        return self.basis.T  # a sparse one takes longer than what it is multiplied with
 
 
 def squared_residuals_and_log_determinant(

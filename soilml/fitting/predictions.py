@@ -180,7 +180,7 @@ def _load_case(case: Case, coordinates: Sequence[Coordinate], x: Floats, at: Ope
     values = {c.path: c.value(x[:, i]) for i, c in enumerate(coordinates)}
     known = {name: getattr(at, name) for name in ("slip", "load", *COVARIATES)}
     repeated = {
-        name: np.tile(np.broadcast_to(value, points), len(x))
+        name: (np.zeros((len(x), points)) + value).ravel()
         for name, value in known.items()
         if value is not None
     }

@@ -198,7 +198,7 @@ def _weighed(posterior: Posterior, node: Explanation) -> tuple[float, list[Stage
     for pattern in (at, replace(at, log=at.log + less), replace(at, present=False)):
         products, constant = wide.reduced(pattern)
         constant += wide.beside(pattern, node.linear.evaluate(pattern).curvature)
-        none = min(none, wide.evidence_with(products, constant, range(p), p)[0])
+        none = min(none, wide.evidence_with(products, constant, np.arange(p)[None], p)[0].item())
         for i, (one, end) in enumerate(zip(found, last, strict=True)):
             own = range(end - one.columns.shape[1], end)
             values = _by_amplitude(wide, products, constant, p, own) + penalties

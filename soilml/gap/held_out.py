@@ -195,28 +195,31 @@ def gap_reduction(
     return GapReduction(old, new, channels, len(readings), description)
 
 
-def plain_fits(posterior: Posterior, shown: Explanation | None) -> tuple[Solution, Solution]:
-    """The soil alone and the explanation shown, fitted under noise and scatter, without remainder.
+def plain_soil(posterior: Posterior) -> Solution:
+    """The soil alone, fitted under noise and scatter, without remainder."""
+    soil = posterior.soil.fit
+    problem = soil.whitened_by(posterior.whiten).problem
+    elsewhere = [np.asarray([c.prior.fraction(c.nominal) for c in soil.coordinates])]
+    elsewhere += [np.full(len(soil.x), x) for x in SOIL_STARTS]
+    begun = [descent_if_any(problem, soil.x, soil.linearisation)]
+    begun += [descent_if_any(problem, start) for start in elsewhere]
+    carried = [f for f in begun if f is not None and np.isfinite(f.prediction).all()]
+    stays = soil.whitened_by(posterior.whiten)
+    return min(carried, key=lambda fit: fit.objective, default=stays)
+
+
+def plain_fits(
+    posterior: Posterior, alone: Solution, shown: Explanation | None
+) -> tuple[Solution, Solution]:
+    """The soil alone and the explanation shown, fitted as by `plain_soil`.
 
     The explanation starts from its optimum beside a remainder, and from the soil alone with the
     effect absent, so that its objective is at most that of the soil alone. It is the soil alone
     where none is shown, or the model refuses it.
     """
-    soil, readings = posterior.soil.fit, posterior.terms.readings
-
-    def problem(fit: Solution) -> LeastSquaresProblem:
-        return LeastSquaresProblem(fit.case, fit.coordinates, readings, posterior.whiten)
-
-    elsewhere = [np.asarray([c.prior.fraction(c.nominal) for c in soil.coordinates])]
-    elsewhere += [np.full(len(soil.x), x) for x in SOIL_STARTS]
-    begun = [descent_if_any(problem(soil), soil.x, soil.linearisation)]
-    begun += [descent_if_any(problem(soil), start) for start in elsewhere]
-    carried = [f for f in begun if f is not None and np.isfinite(f.prediction).all()]
-    stays = soil.whitened_by(posterior.whiten)
-    alone = min(carried, key=lambda fit: fit.objective, default=stays)
     if shown is None or not shown.hypothesis.effects:
         return alone, alone
-    own, values = problem(shown.fit), alone.values()
+    own, values = shown.fit.whitened_by(posterior.whiten).problem, alone.values()
     absent = [
         0.0 if c.effect else c.prior.fraction(values.get(c.path, c.nominal))
         for c in shown.fit.coordinates

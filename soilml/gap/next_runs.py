@@ -97,20 +97,15 @@ def _runs(posterior: Posterior, fits: Mapping[str, Solution]) -> Iterator[_Propo
     """Runs that no explanation refuses, and that one at least tells from a plain repeat."""
     like, first = posterior.terms.readings, next(iter(fits.values()))
     for option in run_options(like, first.fitted()):
-        points = (option.at,) if option.plain is None else (option.at, option.plain)
         try:
-            found = [_linearised(at, fit, like.channels) for at in points for fit in fits.values()]
-        except InputError:
-            continue
-        here, plain = found[: len(fits)], found[len(fits) :]
-        readings = _readings_like(option.at, first.case, like, here[0].prediction)
-        least = SAME_PREDICTION * readings.std
-        if plain and all(
-            (np.abs(a.prediction - b.prediction) <= least).all()
-            for a, b in zip(here, plain, strict=True)
-        ):
-            continue
-        try:
+            here = [_linearised(option.at, fit, like.channels) for fit in fits.values()]
+            readings = _readings_like(option.at, first.case, like, here[0].prediction)
+            if (usual := option.plain) is not None:
+                plain = (_linearised(usual, fit, like.channels) for fit in fits.values())
+                pairs = zip(here, plain, strict=True)
+                changes = (np.abs(a.prediction - b.prediction) / readings.std for a, b in pairs)
+                if all((change <= SAME_PREDICTION).all() for change in changes):
+                    continue
             columns = scatter_columns(first.fitted(), readings)
             terms, at = terms_like(posterior.terms, posterior.noise, readings, columns)
             whiten = terms.whiten(at, np.zeros(len(readings), bool))

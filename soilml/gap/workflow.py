@@ -34,6 +34,7 @@ from soilml.gap.held_out import (
     HoldoutSplit,
     gap_reductions,
     plain_fits,
+    plain_soil,
     predict_held_out,
     predictive_gains,
     split_holdout,
@@ -224,8 +225,8 @@ def _build_report(
         return found
 
     quiet = posterior.no_gap > constants.LIKELIER
-    fits = plain_fits(posterior, None)
-    alone, kept = fits[0], ~posterior.outliers
+    alone, kept = plain_soil(posterior), ~posterior.outliers
+    fits = alone, alone
     misfit = declared_misfit(case, readings.subset(kept), posterior.problem.soil, alone.x)
     gains = {}
     if quiet:
@@ -235,7 +236,7 @@ def _build_report(
     else:
         gains = predictive_gains(posterior, ranked_sets(posterior)[:SCORED], seed)
         decision = decide(posterior, gains, (*opened_priors(posterior), *naming))
-        fits = plain_fits(posterior, decision.shown)
+        fits = plain_fits(posterior, alone, decision.shown)
         figures = figures_of(fits)
     shown = decision.shown
     added = " + ".join(shown.hypothesis.effects) if shown else ""

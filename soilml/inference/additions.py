@@ -28,6 +28,8 @@ def additions(
     """Predicted values of a node's hypothesis with one thing more, the best of a ladder."""
     p = len(node.fit.x)
     extra, moves = _moves(search, node)
+    counts = sorted({len(columns) for _, columns, _ in moves})
+    alike = [[move for move in moves if len(move[1]) == count] for count in counts]
     model = linear_model(search.terms, node.fit, node.outliers, extra)
     start = node.fit.start_values()
     found: dict[Hypothesis, StartedFit] = {}
@@ -40,13 +42,15 @@ def additions(
         except np.linalg.LinAlgError:
             continue
         rest -= 2.0 * float(np.log(prior if at.present else 1.0 - prior))
-        for hypothesis, columns, sign in moves:
-            value, step = model.evidence_with(products, constant, [*range(p), *columns], p)
-            if sign and step[p] * sign <= 0.0:
-                continue
-            value += rest + search.problem.penalty(hypothesis)
-            if hypothesis not in found or value < found[hypothesis].value:
-                found[hypothesis] = StartedFit(hypothesis, start, at, node.outliers, value=value)
+        for group in alike:
+            columns = np.asarray([[*range(p), *free] for _, free, _ in group])
+            values, steps = model.evidence_with(products, constant, columns, p)
+            for (h, _, sign), predicted, step in zip(group, values, steps[:, p], strict=True):
+                value = float(predicted) + rest + search.problem.penalty(h)
+                if sign and step * sign <= 0.0:
+                    continue
+                if h not in found or value < found[h].value:
+                    found[h] = StartedFit(h, start, at, node.outliers, value=value)
     return found | _by_catalogue(search, node, start) | _opened(search, node, start)
 
 

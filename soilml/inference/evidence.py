@@ -40,7 +40,7 @@ from soilml.inference.priors import (
     AT_BOUND,
     LOG_2PI,
     WEAK_PRECISION,
-    correction_of_prior,
+    corrections_of_priors,
     prior_of_hyperparameters,
 )
 from soilml.inference.scatter_elimination import Eliminated, Products
@@ -291,43 +291,43 @@ class LinearisedFit:
         return total[k:, k:] - half.T @ half, value + prior_of_hyperparameters(terms, at)[0]
 
     def evidence_with(
-        self, products: Floats, constant: float, columns: Sequence[int], first: int
-    ) -> tuple[float, Floats]:
-        """Evidence of the model of some columns, and the step of its coordinates.
+        self, products: Floats, constant: float, columns: Integers, first: int
+    ) -> tuple[Floats, Floats]:
+        """Evidence (n,) of n models of some columns (n, k), and the steps (n, k) of each.
 
         products, constant: By `reduced`.
         first: Number of the first coordinate whose prior is integrated here; see `of_priors`.
         """
-        own = list(columns)
-        inner = np.ix_(own, own)
-        precision, held = self.precision[own], self.held[own]
-        curvature = products[inner] + np.diag(precision) + self.information[inner]
-        b = products[own, -1] - self.pull[own]
-        free, step = ~held, np.zeros(len(own))
-        step[free] = np.linalg.solve(curvature[np.ix_(free, free)], b[free])
-        variance = np.diag(np.linalg.inv(curvature))[first:]
-        push = np.where(free, 0.0, b - curvature @ step)
-        value = float(
-            products[-1, -1]
-            - b @ step
-            + np.linalg.slogdet(curvature)[1]
-            + constant
-            - len(own) * LOG_2PI
-            + self.cost
-            + self.constant[own].sum()
-        )
-        value += self.corrections(own[first:], variance, step[first:], push[first:])
-        return value, step
+        inner = columns[:, :, None], columns[:, None, :]
+        free, one = ~self.held[columns], np.eye(columns.shape[1])
+        curvature = products[inner] + self.information[inner]
+        curvature += self.precision[columns][:, None, :] * one
+        b = products[columns, -1] - self.pull[columns]
+        moving = np.where(free[:, :, None] & free[:, None, :], curvature, one)
+        step = np.linalg.solve(moving, np.where(free, b, 0.0)[..., None])[..., 0]
+        variance = np.diagonal(np.linalg.inv(curvature), axis1=1, axis2=2)
+        push = np.where(free, 0.0, b - (curvature @ step[..., None])[..., 0])
+        value = products[-1, -1] + constant + self.cost - columns.shape[1] * LOG_2PI
+        value = value - (b * step).sum(axis=1) + np.linalg.slogdet(curvature)[1]
+        value += self.constant[columns].sum(axis=1)
+        further = columns[:, first:], variance[:, first:], step[:, first:], push[:, first:]
+        return value + self.corrections(*further).sum(axis=1), step
 
     def corrections(
-        self, numbers: Sequence[int], variance: Floats, step: Floats, push: Floats
-    ) -> float:
-        """-2 ln of the factors by which exact priors of some coordinates change the evidence."""
-        total = 0.0
-        for i, v, s, p in zip(numbers, variance, step, push, strict=True):
-            own, x, held = self.coordinates[i], float(self.x[i]), bool(self.held[i])
-            total += correction_of_prior(own, x, float(1.0 / v), float(s), float(p), held=held)
-        return total
+        self, numbers: Integers, variance: Floats, step: Floats, push: Floats
+    ) -> Floats:
+        """-2 ln of the factors (...) by which exact priors of coordinates change the evidence."""
+        exact = np.asarray([np.isfinite(c.std) for c in self.coordinates])[numbers]
+        found, own = np.zeros(numbers.shape), numbers[~exact]  # a normal prior is exact
+        found[~exact] = corrections_of_priors(
+            [self.coordinates[i] for i in own],
+            self.x[own],
+            1.0 / variance[~exact],
+            step[~exact],
+            push[~exact],
+            self.held[own],
+        )
+        return found
 
 
 def linear_model(
@@ -377,4 +377,5 @@ def linear_model(
 def of_priors(model: LinearisedFit, found: Evaluation) -> float:
     """-2 ln of the factors by which exact priors along each axis differ from their stand-ins."""
     variance = np.diag(found.covariance)
-    return model.corrections(range(len(variance)), variance, found.step, found.push)
+    numbers = np.arange(len(variance))
+    return float(model.corrections(numbers, variance, found.step, found.push).sum())

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.fitting.coordinates import Coordinate
@@ -72,10 +75,15 @@ LEAST_SHARE = 0.02
 FARTHEST = 20.0
 
 
-def correction_of_prior(
-    coordinate: Coordinate, x: float, precision: float, step: float, push: float, *, held: bool
-) -> float:
-    r"""-2 ln of the factor by which one exact prior changes Laplace's approximation.
+def corrections_of_priors(
+    coordinates: Sequence[Coordinate],
+    x: Floats,
+    precision: Floats,
+    step: Floats,
+    push: Floats,
+    held: NDArray[np.bool_],
+) -> Floats:
+    r"""-2 ln of the factors (n,) by which exact priors, not normal, change Laplace's approximation.
 
     .. math:: I = \int p(x + t)\, e^{g t - \lambda t^2 / 2} dt
 
@@ -84,48 +92,62 @@ def correction_of_prior(
     at a bound has the gradient that presses it there, and none that would lead away from it, since
     that was not fitted.
     """
-    if np.isfinite(coordinate.std):  # a normal prior is exact
-        return 0.0
-    standin = WEAK_PRECISION if coordinate.of_candidate else UNIFORM_PRECISION
-    own, slope = max(precision - standin, LEAST_SHARE * precision), precision * step
-    if held:
-        inward = 1.0 if x <= coordinate.lower + AT_BOUND else -1.0
-        slope = push if push * inward < 0.0 else 0.0
-    low, high = coordinate.lower - x, coordinate.upper - x
-    laplace = 0.5 * (LOG_2PI - np.log(precision)) + (0.0 if held else 0.5 * precision * step**2)
-    if not coordinate.of_candidate:
-        return -2.0 * float(_log_integral(slope, own, low, high) - laplace)
-    peak, std = np.clip(slope / own, low, high), own**-0.5
-    if held and slope:
-        std = min(std, 1.0 / abs(slope))
-    wide = np.linspace(max(low, -FARTHEST), min(high, FARTHEST), 33)
-    t = np.unique(np.clip(np.concatenate([peak + std * _ABOUT, wide, _SIZES - x]), low, high))
-    log = slope * t - 0.5 * own * t**2
-    log += log_density_of_size(x + t, coordinate.lower < 0.0 < coordinate.upper)
-    top = float(log.max())
-    return -2.0 * float(top + np.log(np.trapezoid(np.exp(log - top), t)) - laplace)
+    lower, upper = (np.asarray([getattr(c, e) for c in coordinates]) for e in ("lower", "upper"))
+    of_size = np.asarray([c.of_candidate for c in coordinates], bool)
+    standin = np.where(of_size, WEAK_PRECISION, UNIFORM_PRECISION)
+    own = np.maximum(precision - standin, LEAST_SHARE * precision)
+    inward = np.where(x <= lower + AT_BOUND, 1.0, -1.0)
+    slope = np.where(held, np.where(push * inward < 0.0, push, 0.0), precision * step)
+    low, high = lower - x, upper - x
+    laplace = 0.5 * (LOG_2PI - np.log(precision)) + np.where(held, 0.0, 0.5 * precision * step**2)
+    integral = _log_integral(slope, own, low, high)
+    if of_size.any():
+        each = (part[of_size] for part in (x, own, slope, lower, upper, held))
+        integral[of_size] = _log_integral_of_size(*each)
+    return np.asarray(-2.0 * (integral - laplace))
 
 
-def _log_integral(slope: float, precision: float, low: float, high: float) -> float:
-    """Logarithm of the integral of exp(slope t - precision t^2 / 2) between two bounds."""
+def _log_integral_of_size(
+    x: Floats,
+    precision: Floats,
+    slope: Floats,
+    lower: Floats,
+    upper: Floats,
+    held: NDArray[np.bool_],
+) -> Floats:
+    """ln of the integrals (n,) with the density of a size; see `corrections_of_priors`."""
+    low, high, std = lower - x, upper - x, precision**-0.5
+    peak = np.clip(slope / precision, low, high)
+    pressed = held & (slope != 0.0)
+    std[pressed] = np.minimum(std[pressed], 1.0 / np.abs(slope[pressed]))
+    wide = np.linspace(np.maximum(low, -FARTHEST), np.minimum(high, FARTHEST), 33)
+    points = [peak + np.outer(_ABOUT, std), wide, np.subtract.outer(_SIZES, x)]
+    t = np.sort(np.clip(np.concatenate(points), low, high), axis=0)
+    log = slope * t - 0.5 * precision * t**2
+    log += log_density_of_size(x + t, (lower < 0.0) & (upper > 0.0))
+    top = log.max(axis=0)
+    return np.asarray(top + np.log(np.trapezoid(np.exp(log - top), t, axis=0)))
+
+
+def _log_integral(slope: Floats, precision: Floats, low: Floats, high: Floats) -> Floats:
+    """ln of the integrals (n,) of exp(slope t - precision t^2 / 2) between two bounds."""
     from scipy.special import log_ndtr
 
     root = np.sqrt(precision)
     a, b = low * root - slope / root, high * root - slope / root
-    if a > 0.0:  # mirrored, so that the tail is that below
-        a, b = -b, -a
-    upper, lower = float(log_ndtr(b)), float(log_ndtr(a))
-    inside = upper + np.log1p(-np.exp(min(lower - upper, -1e-12)))
-    return float(0.5 * slope**2 / precision + 0.5 * (LOG_2PI - np.log(precision)) + inside)
+    # where a is positive, mirrored, so that the tail is that below
+    lower, upper = log_ndtr(np.where(a > 0.0, -b, a)), log_ndtr(np.where(a > 0.0, -a, b))
+    inside = upper + np.log1p(-np.exp(np.minimum(lower - upper, -1e-12)))
+    return np.asarray(0.5 * slope**2 / precision + 0.5 * (LOG_2PI - np.log(precision)) + inside)
 
 
-def log_density_of_size(x: Floats, two_sided: bool) -> Floats:
+def log_density_of_size(x: Floats, two_sided: bool | NDArray[np.bool_]) -> Floats:
     r"""ln of the density of sizes x (...), in reference sizes: 1 / [(|x| + e) ln(1 + X / e)] to X.
 
     Beyond X it falls with further powers of the size.
     """
     small, large = constants.SMALLEST_SIZE, constants.LARGEST_SIZE
     size = np.abs(x) + small
-    span = np.log1p(large / small) * (2.0 if two_sided else 1.0)
+    span = np.log1p(large / small) * np.where(two_sided, 2.0, 1.0)
     beyond = np.maximum(np.log(size / (large + small)), 0.0)
     return np.asarray(-np.log(span * size) - constants.TAIL_POWER * beyond)

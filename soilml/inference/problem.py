@@ -140,7 +140,11 @@ class InferenceProblem:
 
     def shapes(self, name: str) -> list[Coordinate]:
         """The coordinates of the shape of an effect's law that the readings can tell."""
-        return [c for c in shape_coordinates(self.effects[name]) if self.varies[c.name]]
+        return [c for c in self._all_shapes[name] if self.varies[c.name]]
+
+    @cached_property
+    def _all_shapes(self) -> dict[str, list[Coordinate]]:
+        return {name: shape_coordinates(effect) for name, effect in self.effects.items()}
 
     def coordinates(self, hypothesis: Hypothesis) -> list[Coordinate]:
         """The unknowns of a hypothesis: soil, sizes, and shapes where the laws are free."""
@@ -155,7 +159,7 @@ class InferenceProblem:
         value = sum(self.penalties[name] for name in hypothesis.effects)
         outside = constants.OUTSIDE_PRIORS
         value -= 2.0 * float(np.log(outside if hypothesis.wide_priors else 1.0 - outside))
-        if any(shape_coordinates(self.effects[name]) for name in hypothesis.effects):
+        if any(self._all_shapes[name] for name in hypothesis.effects):
             other = constants.OTHER_LAW_PRIOR
             value -= 2.0 * float(np.log(other if hypothesis.free_law else 1.0 - other))
         return value
