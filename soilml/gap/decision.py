@@ -13,7 +13,7 @@ from soilml.inference import constants
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Names, Posterior
 from soilml.remarks import Remark
-from soilml.report.numbers import format_quantity
+from soilml.report.numbers import format_probability, format_quantity
 
 LISTED_SUSPECTS = 8  # Suspects that are listed
 #: Why nothing is named where the evidence for the suspects is weak.
@@ -88,9 +88,11 @@ def decide(
     other_soil = alone and alone.hypothesis.wide_priors and alone.share_without > 0.5
     if other_soil and none > max(constants.UNCERTAIN, chance):
         return Decision("undecided", reasons=(soil_outside_priors(posterior),))
-    hopeless = 1.0 - constants.UNCERTAIN if obstacles else 0.0
-    if not ranked or (none > constants.UNCERTAIN and none > max(chance, hopeless)):
-        return Decision("not-testable" if obstacles else "unknown", reasons=reasons)
+    smooth = none - posterior.no_gap  # a gap that a smooth error explains
+    if obstacles and (not ranked or none > 1.0 - constants.UNCERTAIN):
+        return Decision("not-testable", reasons=reasons)
+    if not ranked or (not obstacles and none > constants.UNCERTAIN and smooth > chance):
+        return Decision("unknown")
     listed = not_rejected(posterior, ranked)
     best = listed[0]
     node = posterior.node_of(best)
@@ -101,7 +103,9 @@ def decide(
     if doubt := _doubt(posterior, node, gains.get(best, np.inf)):
         return replace(suspected, reasons=(doubt,))
     if none > constants.UNCERTAIN:
-        return replace(suspected, reasons=(NOT_DECISIVE,))
+        gap = 1.0 - posterior.no_gap
+        why = gap_not_certain(gap) if gap < 1.0 - constants.UNCERTAIN else NOT_DECISIVE
+        return replace(suspected, reasons=(why,))
     if chance >= constants.NAMED_PROBABILITY:
         # an offset of one channel imitates what no catalogue has, such as a crust on the soil: a
         # check of the sensor shows a fault, rows alone do not
@@ -119,6 +123,12 @@ def decide(
     if none <= constants.CHANCE and len(listed) > 1 and together >= constants.LIKELIER:
         return Decision("class", listed, listed, node)
     return replace(suspected, reasons=(NOT_DECISIVE,))
+
+
+def gap_not_certain(probability: float) -> Remark:
+    """Why nothing is named where there may be no gap."""
+    text = f"that there is a gap is not certain (probability {format_probability(probability)})"
+    return Remark("gap-not-certain", text)
 
 
 def pressed_priors(fit: Solution) -> dict[str, str]:

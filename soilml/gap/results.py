@@ -232,10 +232,10 @@ class GapReport(Result):
 
     @property
     def first(self) -> tuple[str, ...]:
-        """The effects that are claimed, else those of the first suspect."""
+        """The effects whose figures are shown: those that are claimed, else first suspected."""
         if self.effects:
             return tuple(e.name for e in self.effects)
-        return self.suspects[0].effects if self.suspects else ()
+        return self.cause_set[0] if self.cause_set else ()
 
     def report(self) -> Report:
         """Verdict, soil and effects, readings beside the model, where it disagrees, and by what."""

@@ -271,7 +271,7 @@ def _build_report(
         seed=seed,
         curves=FittedReadings.of_solutions(*fits, posterior.std),
     )
-    if decision.status in ("no-gap", "undecided"):
+    if decision.status == "no-gap":
         return report
     listed = suspects(posterior, decision, gains)
     explained = shown if claimed and shown is not None else posterior.soil

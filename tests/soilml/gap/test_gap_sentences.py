@@ -125,7 +125,7 @@ def test_what_is_left_says_beside_which_explanation_and_what_its_cause_is_like()
 def test_suspects_have_their_probabilities_and_the_first_three_are_listed():
     chances = {"a": 0.86, "b": 0.45, "c": 0.24, "d": 0.1}
     suspects = tuple(Suspect((n,), 0.0, p) for n, p in chances.items())
-    assert said("suspected", suspects=suspects) == (
+    assert said("suspected", suspects=suspects, cause_set=(("a",),)) == (
         "Cause not certain: first suspect is a (probability 0.86); the gap shrinks 8.80 -> 1.10."
     )
     found = lines("suspected", suspects=suspects)
@@ -136,7 +136,7 @@ def test_suspects_have_their_probabilities_and_the_first_three_are_listed():
     assert "suspects" not in lines("suspected", suspects=bound[1:])
     large = (Suspect(("b", "c"), -1.3, 0.2, times_usual={"c": 5.93}),)
     assert "first suspect is b + c (probability 0.20, implausibly large)" in said(
-        "suspected", suspects=large
+        "suspected", suspects=large, cause_set=(("b", "c"),)
     )
     assert lines("suspected", suspects=large)["suspects"].endswith(
         "b + c (0.20). The first needs c at 5.9 times its usual size."
