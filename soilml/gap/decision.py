@@ -20,14 +20,10 @@ LISTED_SUSPECTS = 8  # Suspects that are listed
 NOT_DECISIVE = Remark("not-decisive", "the evidence is not decisive beside the model's usual error")
 #: Why an explanation that the evidence supports is not claimed, by codes.
 _DOUBTS = {
-    "implausible-fault": "{} would be an implausibly large fault: check the sensor or the rig",
-    "implausible-size": "{} would have to be implausibly large: its law or the cause is another",
     "not-predictive": "{} predicts rows kept back no better than the soil alone: it fits the rows, "
     "but so does a smooth remainder",
     "other-law": "the law of {} would differ much from the catalogue's: the cause may be one that "
     "the catalogue lacks",
-    "not-catalogued": "a large discrepancy is left beside {}: at least four times the usual error "
-    "of a model",
     "unchecked-fault": "{} is a fault that nothing has checked: a law that the catalogue lacks may "
     "look like it; check it, and state the check with --checked",
 }
@@ -116,7 +112,7 @@ def decide(
         status = "named"
         if node.share_without < constants.LIKELIER:
             status = "partly-named"
-        elif node.hypothesis.free_law and law_matters(posterior, node):
+        elif node.hypothesis.free_law:
             status = "form-open"
         return Decision(status, (best,), listed[:1], node)
     together = sum(posterior.sets[names] for names in listed)
@@ -171,33 +167,11 @@ def _reason(code: str, names: Names) -> Remark:
 def _doubt(posterior: Posterior, node: Explanation, gain: float) -> Remark | None:
     """Why an explanation is not claimed, whatever its probability is."""
     names = node.hypothesis.effects
-    deviation = np.abs(node.fit.x) * np.sqrt(node.fit.precision)
-    faults = tuple(
-        c.effect
-        for c, d in zip(node.fit.coordinates, deviation, strict=True)
-        if c.effect and not c.is_shape and d > constants.MAX_SIZE_DEVIATION
-    )
-    if faults:
-        return _reason("implausible-fault", faults)
-    if implausible_sizes(node.fit):
-        return _reason("implausible-size", names)
     if not gain > 0.0:
         return _reason("not-predictive", names)
-    amplitude = posterior.terms.amplitude(node.at)
-    if amplitude.max(initial=0.0) >= constants.LARGE_REMAINDER:
-        return _reason("not-catalogued", names)
     if posterior.by_other_law(node.hypothesis):
         return _reason("other-law", names)
     return None
-
-
-def implausible_sizes(fit: Solution) -> dict[str, float]:
-    """Sizes, in usual ones, of the effects of soil and gear that are far larger, by name."""
-    return {
-        c.effect: float(abs(x))
-        for c, x in zip(fit.coordinates, fit.x, strict=True)
-        if c.effect and not c.is_shape and np.isinf(c.std) and abs(x) > constants.LARGEST_SIZE
-    }
 
 
 def suspects(
@@ -210,30 +184,6 @@ def suspects(
     rest = [n for n in rest if not any(set(n) <= set(o) or set(o) < set(n) for o in first)]
     found = []
     for names in [*first, *rest[: LISTED_SUSPECTS - 1]]:
-        node, odds = posterior.node_of(names), posterior.log_odds(*names)
-        sizes = {} if node is None else implausible_sizes(node.fit)
-        chance = posterior.probability(*names)
-        found.append(Suspect(names, odds, chance, gains.get(names), sizes))
+        odds, chance = posterior.log_odds(*names), posterior.probability(*names)
+        found.append(Suspect(names, odds, chance, gains.get(names)))
     return found
-
-
-def law_matters(posterior: Posterior, node: Explanation) -> bool:
-    """Whether the free law and the catalogue's differ in the measured range by more than matters.
-
-    They differ if, in some channel, the root mean square difference of their predictions exceeds
-    both the standard error of a mean over the readings of that channel and the range of the channel
-    times `constants.NEGLIGIBLE_FRACTION`. Without a fit of the catalogue's law they do.
-    """
-    readings, own = posterior.terms.readings, node.hypothesis
-    catalogue = posterior.search.nodes.get(replace(own, free_law=False))
-    if catalogue is None:
-        return True
-    difference = node.fit.prediction - catalogue.fit.prediction
-    for i in range(len(readings.channels)):
-        in_channel = readings.channel == i
-        rms = np.sqrt(np.mean(difference[in_channel] ** 2))
-        mean_error = np.sqrt(np.mean(posterior.std[in_channel] ** 2) / in_channel.sum())
-        span = np.ptp(np.append(readings.measured[in_channel], 0.0))
-        if rms > max(mean_error, constants.NEGLIGIBLE_FRACTION * span):
-            return True
-    return False

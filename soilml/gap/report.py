@@ -9,7 +9,6 @@ import numpy as np
 
 from soilml.gap.pictures import bars_picture, map_picture, remainder_picture
 from soilml.gap.results import GapReport
-from soilml.gap.sentences import needed_sizes
 from soilml.gap.statuses import STATUSES
 from soilml.io.text_tables import csv_text
 from soilml.remarks import texts
@@ -131,8 +130,6 @@ def _suspects(found: GapReport) -> ReportTable:
         Column("probability", [s.probability for s in shown], digits=2),
         Column("ln(density kept back)", gains, digits=3),
     ]
-    if any(s.times_usual for s in shown):
-        columns.append(Column("needs", [needed_sizes(s.times_usual) for s in shown]))
     note = (
         f"Probability of a gap {found.gap_probability:.2f}, of a cause outside the catalogue "
         f"{found.outside_probability:.2f}."

@@ -50,8 +50,6 @@ class Suspect:
     #: Logarithm of the density of rows kept back, above that of the soil alone, both beside a
     #: smooth remainder; None where no row was kept back for it
     predictive_gain: float | None = None
-    #: Sizes of its effects that are implausibly large, in usual ones, by name
-    times_usual: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -121,14 +121,5 @@ NAMED_PROBABILITY = 0.9
 UNCERTAIN, CHANCE = 0.2, 0.05
 #: Odds against the likeliest set below which another one is rejected.
 REJECTED = 0.03
-#: Amplitude of a remaining discrepancy, in usual ones, beside which nothing is named: 8 % of a
-#: range.
-LARGE_REMAINDER = 4.0
-#: Size of a sensor's or the rig's fault, in prior standard deviations, above which it explains
-#: nothing: a gain error of 24 % without calibration.
-MAX_SIZE_DEVIATION = 4.0
-#: Difference of the predictions of two laws, as a fraction of a channel's range, below which the
-#: law does not matter: that of a usual model error.
-NEGLIGIBLE_FRACTION = 0.02
 #: Probability that the explanations of a returned model together have, and how many it has at most.
 HELD, MOST_RETURNED = 0.95, 12

@@ -134,13 +134,6 @@ def test_suspects_have_their_probabilities_and_the_first_three_are_listed():
     bound = (suspects[0], replace(suspects[1], probability=0.0049))
     assert lines("suspected", suspects=bound)["suspects"] == f"{begin} a (0.86)."
     assert "suspects" not in lines("suspected", suspects=bound[1:])
-    large = (Suspect(("b", "c"), -1.3, 0.2, times_usual={"c": 5.93}),)
-    assert "first suspect is b + c (probability 0.20, implausibly large)" in said(
-        "suspected", suspects=large, cause_set=(("b", "c"),)
-    )
-    assert lines("suspected", suspects=large)["suspects"].endswith(
-        "b + c (0.20). The first needs c at 5.9 times its usual size."
-    )
 
 
 @pytest.mark.parametrize("outside, stated", [(0.049, False), (0.24, True)])
