@@ -97,18 +97,6 @@ def _tables(found: GapReport) -> Iterator[ReportTable]:
         yield _discrepancy(found)
     if found.next_runs:
         yield _next_runs(found)
-    if found.soil_tests:
-        tests, units = found.soil_tests, [test["unit"] for test in found.soil_tests]
-        yield ReportTable(
-            "Tests of the soil",
-            [
-                Column("test", [t["label"] for t in tests]),
-                Column("measured", [t["measured"] for t in tests], units, digits=3),
-                Column("soil alone, sigma off", [t["sigma_before"] for t in tests], digits=2),
-                Column("soil after, sigma off", [t["sigma_after"] for t in tests], digits=2),
-            ],
-            "Distances in standard deviations of what such tests scatter from place to place.",
-        )
     if entries := found.variance_components:
         size = ["rad" if name == "friction_angle_std" else "1" for name in entries]
         yield ReportTable(

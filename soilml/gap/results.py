@@ -10,7 +10,6 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.fitted_readings import FittedReadings
-from soilml.physics.soils.soil_tests import deviations
 from soilml.remarks import Remark
 from soilml.report.numbers import format_residual
 from soilml.results import EstimatedValue, Result
@@ -271,28 +270,11 @@ class GapReport(Result):
             "unit": [v.unit for v in found.values()],
         }
 
-    @property
-    def soil_tests(self) -> list[dict[str, Any]]:
-        """Each test of the model's soil, and how far the soil before and after is from it.
-
-        `sigma_before` and `sigma_after` are in standard deviations of its logarithm.
-        """
-        tests, sigmas = self.model.soil_tests, []
-        for soil in (self.soil_before, self.soil_after):
-            values = np.asarray([estimate.value for estimate in soil.values()])
-            sigmas.append(deviations(tests, self.model.soil, list(soil), values).tolist())
-        names = ("label", "unit", "measured", "sigma_before", "sigma_after")
-        return [
-            dict(zip(names, (test.label(), test.unit, test.measured, *both), strict=True))
-            for test, *both in zip(tests, *sigmas, strict=True)
-        ]
-
     def as_json(self) -> dict[str, Any]:
         """The content of gap.json."""
         from soilml import __version__
 
-        more = {"soil_tests": self.soil_tests, "soilml_version": __version__}
-        return {**as_json_entry(self), **more}
+        return {**as_json_entry(self), "soilml_version": __version__}
 
 
 def as_json_entry(value: Any) -> Any:

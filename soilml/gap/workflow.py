@@ -40,7 +40,7 @@ from soilml.gap.held_out import (
     without_grown,
 )
 from soilml.gap.next_runs import competing_explanations, next_runs
-from soilml.gap.notes import analysis_notes, indistinct, one_channel, outlier_names
+from soilml.gap.notes import analysis_notes, indistinct, outlier_names
 from soilml.gap.remainder import discrepancy_map, remaining_discrepancy
 from soilml.gap.results import GapReduction, GapReport
 from soilml.gap.sentences import headline, report_lines
@@ -259,7 +259,6 @@ def _build_report(
             *analysis_notes(
                 posterior, alone, whole or shown or posterior.soil, split.analysed.place
             ),
-            *(one_channel(posterior) if decision.status == "no-gap" else ()),
         ),
         variance_components=variance_component_entries(posterior),
         misfit=None if misfit is None else misfit.per_freedom,

@@ -5,7 +5,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from gap_sets import analysed, case_of, driven, hidden, remark
+from gap_sets import analysed, case_of, hidden, remark
 
 from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.plans import Plan
@@ -217,18 +217,6 @@ def test_reports_on_sealed_sets_are_short_and_in_order(kind):
     _, table, _, _ = hidden(kind)
     check_words(analysed(kind), set(table["run"]))
     check_order(analysed(kind))
-
-
-@pytest.mark.slow
-def test_torque_alone_says_what_could_hide_in_it():
-    case = case_of()
-    table = driven(case)
-    columns = {n: table[n] for n in ("run", "slip", "load_N", "torque_Nm")}
-    report = gap(case, Table(columns))
-    assert report.status == "no-gap"
-    (note,) = [note for note in report.notes if note.code == "hidden-effect"]
-    assert note.text.startswith("only torque was measured: ")
-    assert "bulldozing" in note.about and "would not show" in note.text
 
 
 LONG = "of sinkage_m, run_a and run_b differ " + "very " * 30 + "much"
