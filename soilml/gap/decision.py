@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,10 +20,7 @@ LISTED_SUSPECTS = 8  # Suspects that are listed
 NOT_DECISIVE = Remark("not-decisive", "the evidence is not decisive beside the model's usual error")
 #: Why an explanation that the evidence supports is not claimed, by codes.
 _DOUBTS = {
-    "not-predictive": "{} predicts rows kept back no better than the soil alone: it fits the rows, "
-    "but so does a smooth remainder",
-    "other-law": "the law of {} would differ much from the catalogue's: the cause may be one that "
-    "the catalogue lacks",
+    "implausible-size": "{} would have to be implausibly large: its law or the cause is another",
     "unchecked-fault": "{} is a fault that nothing has checked: a law that the catalogue lacks may "
     "look like it; check it, and state the check with --checked",
 }
@@ -68,12 +65,9 @@ def not_rejected(posterior: Posterior, ranked: Sequence[Names]) -> tuple[Names, 
     return tuple(n for n in kept if not any(set(other) < set(n) for other in kept))
 
 
-def decide(
-    posterior: Posterior, gains: Mapping[Names, float], obstacles: Sequence[Remark]
-) -> Decision:
+def decide(posterior: Posterior, obstacles: Sequence[Remark]) -> Decision:
     """The status of a report where a gap is likely; see `soilml.gap.statuses.STATUSES`.
 
-    gains: Log density of rows kept back by the first sets, above that of the soil alone.
     obstacles: Why these runs cannot identify a cause.
     """
     none, reasons = posterior.no_effect, tuple(obstacles)
@@ -96,8 +90,8 @@ def decide(
     suspected = Decision("suspected", (), listed, node, reasons)
     if obstacles:
         return suspected
-    if doubt := _doubt(posterior, node, gains.get(best, np.inf)):
-        return replace(suspected, reasons=(doubt,))
+    if oversized(node.fit):
+        return replace(suspected, reasons=(_reason("implausible-size", best),))
     if none > constants.UNCERTAIN:
         gap = 1.0 - posterior.no_gap
         why = gap_not_certain(gap) if gap < 1.0 - constants.UNCERTAIN else NOT_DECISIVE
@@ -164,19 +158,15 @@ def _reason(code: str, names: Names) -> Remark:
     return Remark(code, _DOUBTS[code].format(" + ".join(names)), names)
 
 
-def _doubt(posterior: Posterior, node: Explanation, gain: float) -> Remark | None:
-    """Why an explanation is not claimed, whatever its probability is."""
-    names = node.hypothesis.effects
-    if not gain > 0.0:
-        return _reason("not-predictive", names)
-    if posterior.by_other_law(node.hypothesis):
-        return _reason("other-law", names)
-    return None
+def oversized(fit: Solution) -> bool:
+    """Whether an effect of soil or gear is far larger than usual ones."""
+    return any(
+        c.effect and not c.is_shape and np.isinf(c.std) and abs(x) > constants.LARGEST_SIZE
+        for c, x in zip(fit.coordinates, fit.x, strict=True)
+    )
 
 
-def suspects(
-    posterior: Posterior, decision: Decision, gains: Mapping[Names, float]
-) -> list[Suspect]:
+def suspects(posterior: Posterior, decision: Decision) -> list[Suspect]:
     """Explanations with their odds against all others, the first one that is shown first."""
     ranked = ranked_sets(posterior)
     first = decision.listed[:1] or tuple(ranked[:1])
@@ -185,5 +175,5 @@ def suspects(
     found = []
     for names in [*first, *rest[: LISTED_SUSPECTS - 1]]:
         odds, chance = posterior.log_odds(*names), posterior.probability(*names)
-        found.append(Suspect(names, odds, chance, gains.get(names)))
+        found.append(Suspect(names, odds, chance))
     return found

@@ -112,11 +112,9 @@ def _tables(found: GapReport) -> Iterator[ReportTable]:
 def _suspects(found: GapReport) -> ReportTable:
     """The likeliest explanations, those that are claimed first."""
     shown = found.suspects[:_LISTED]
-    gains = [np.nan if s.predictive_gain is None else s.predictive_gain for s in shown]
     columns = [
         Column("effects", [" + ".join(s.effects) for s in shown]),
         Column("probability", [s.probability for s in shown], digits=2),
-        Column("ln(density kept back)", gains, digits=3),
     ]
     note = (
         f"Probability of a gap {found.gap_probability:.2f}, of a cause outside the catalogue "

@@ -46,9 +46,6 @@ class Suspect:
     effects: tuple[str, ...]
     log_odds: float  # natural logarithm, within the catalogue
     probability: float  # that these effects are present, causes outside the catalogue included
-    #: Logarithm of the density of rows kept back, above that of the soil alone, both beside a
-    #: smooth remainder; None where no row was kept back for it
-    predictive_gain: float | None = None
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.usable_readings import prepared_rows
 from soilml.gap.cause_of_remainder import described_cause
 from soilml.gap.checks import faults_of, naming_obstacles
-from soilml.gap.decision import Decision, decide, opened_priors, ranked_sets, suspects
+from soilml.gap.decision import Decision, decide, opened_priors, suspects
 from soilml.gap.disagreements import disagreements
 from soilml.gap.estimates import (
     named_effects,
@@ -35,7 +35,6 @@ from soilml.gap.held_out import (
     gap_reductions,
     plain_fits,
     predict_held_out,
-    predictive_gains,
     split_holdout,
     without_grown,
 )
@@ -58,8 +57,6 @@ from soilml.row_status import Status
 
 #: Readings that an analysis may have: its columns are as long, and there are some for each run.
 MOST_READINGS = 3600
-#: Explanations that are scored on rows kept back, the likeliest first.
-SCORED = 4
 #: Share of outliers above which they form a pattern, so that the data cannot be analysed, and
 #: outliers that the reason states.
 MAX_OUTLIER_FRACTION, OUTLIERS_STATED = 0.1, 3
@@ -225,14 +222,12 @@ def _build_report(
     fits = plain_fits(posterior, None)
     alone, kept = fits[0], ~posterior.outliers
     misfit = declared_misfit(case, readings.subset(kept), posterior.problem.soil, alone.x)
-    gains = {}
     if quiet:
         figures = figures_of(fits)
         found = disagreements(posterior, case, misfit, alone, figures)
         decision = Decision("undecided" if found else "no-gap", reasons=tuple(found))
     else:
-        gains = predictive_gains(posterior, ranked_sets(posterior)[:SCORED], seed)
-        decision = decide(posterior, gains, (*opened_priors(posterior), *naming))
+        decision = decide(posterior, (*opened_priors(posterior), *naming))
         fits = plain_fits(posterior, decision.shown)
         figures = figures_of(fits)
     shown = decision.shown
@@ -270,7 +265,7 @@ def _build_report(
     )
     if decision.status == "no-gap":
         return report
-    listed = suspects(posterior, decision, gains)
+    listed = suspects(posterior, decision)
     explained = shown if claimed and shown is not None else posterior.soil
     rivals = competing_explanations(posterior, decision, listed)
     return replace(

@@ -94,12 +94,6 @@ UNLIKELY_MODEL = 0.01
 NEGLIGIBLE_DISCREPANCY = 0.3
 #: Probability that an effect of the catalogue is the right description of a cause that it explains.
 IN_CATALOGUE = 0.97
-#: Share of the explanations by another law than the catalogue's that are right: of an effect whose
-#: own law explains no more than the soil alone, another cause may be at work.
-OTHER_LAW_RIGHT = 0.3
-#: Squared distance of the shapes from the catalogue's law, in prior variances, up to which a free
-#: law is still the catalogue's.
-FAR_LAW = 1.0
 #: Factor on intervals about their mean: what the discrepancy of each channel cannot imitate, and
 #: what Laplace's approximation of the hyperparameters leaves out. Calibrated on the sample.
 INTERVAL_FACTOR = 1.35

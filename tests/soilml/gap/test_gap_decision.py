@@ -23,10 +23,9 @@ def test_a_smooth_error_is_stated_where_it_is_likelier_than_each_effect(no_gap, 
         nodes=[node(*names) for names in sets],
         node_of=lambda names: node(*names),
         probability=lambda *names: sets[names],
-        by_other_law=lambda _: False,
         terms=SimpleNamespace(amplitude=lambda _: np.zeros(3)),
     )
-    decision = decide(posterior, {}, ())
+    decision = decide(posterior, ())
     assert decision.status == status
     if status == "suspected":
         assert [r.code for r in decision.reasons] == ["gap-not-certain"]
