@@ -2,8 +2,8 @@
 
 A node is a hypothesis that was fitted. From each node near the best one, the evidence of every
 addition (an effect, free laws, opened priors) is predicted by a linear model, under a ladder of
-hyperparameters that it may lead to: as fitted, without discrepancy, with less of it, with hardly
-any scatter. The best are fitted, in turn with their hyperparameters, until nothing is left to fit.
+hyperparameters that it may lead to: as fitted, without discrepancy, with less of it. The best are
+fitted, in turn with their hyperparameters, until nothing is left to fit.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ from soilml.inference.explanation import Explanation, StartedFit
 from soilml.inference.gaussian_terms import (
     DISCREPANCY,
     FIRST_AMPLITUDE,
-    SCATTER,
     GaussianTerms,
     Hyperparameters,
     gaussian_terms,
@@ -45,9 +44,8 @@ SOIL_STARTS = (0.5, 0.25)
 #: Share of the distance from the middle of its prior at which a soil parameter starts again: one at
 #: a bound would stay there.
 INWARD = 0.8
-#: Steps of the ladder: of the logarithm of the discrepancy, and the logarithm of hardly any
-#: scatter; scatter above the third counts as some.
-LESS_DISCREPANCY, LITTLE_SCATTER, SOME_SCATTER = 1.0, -1.5, -0.7
+#: Step of the ladder, of the logarithm of the discrepancy.
+LESS_DISCREPANCY = 1.0
 #: Amplitudes and scatter below the first (the logarithm below the second) count less where they
 #: change.
 SMALL, USUAL, OF_SMALL = 0.3, -0.5, 0.2
@@ -334,16 +332,11 @@ class Search:
         return sorted(set(chosen), key=_by_value)
 
     def _ladder(self, node: Explanation) -> list[Hyperparameters]:
-        """Hyperparameters that an addition may lead to: less discrepancy, or less scatter."""
-        beside, without = node.beside.at, node.without.at
-        kinds = self.terms.of_kind(DISCREPANCY), self.terms.of_kind(SCATTER)
-        less = np.where(kinds[0], beside.log - LESS_DISCREPANCY, beside.log)
-        found = [beside, without, replace(beside, log=less)]
-        if max(beside.log[kinds[1]].max(), without.log[kinds[1]].max()) > SOME_SCATTER:
-            for at in (beside, without):
-                still = np.where(kinds[1], np.minimum(at.log, LITTLE_SCATTER), at.log)
-                found.append(replace(at, log=still))
-        return found
+        """Hyperparameters that an addition may lead to: those of a node, or less discrepancy."""
+        beside = node.beside.at
+        own = self.terms.of_kind(DISCREPANCY)
+        less = np.where(own, beside.log - LESS_DISCREPANCY, beside.log)
+        return [beside, node.without.at, replace(beside, log=less)]
 
 
 def _by_value(predicted: StartedFit) -> tuple[float, Hypothesis]:
