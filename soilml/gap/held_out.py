@@ -31,10 +31,12 @@ RUNS_PER_HELD_OUT = 4
 
 #: The fitted rows, and the parts that are held out, by their keys in a report.
 FITTED, RUNS = "train", "held_out_runs"
-REGION = "held_out_region"
+REGION, SLIPS = "held_out_region", "held_out_slips"
 FOLDS = 4
 #: Fraction of the readings, those of highest load or of highest slip, in the held-out region.
 REGION_FRACTION = 0.3
+#: Levels of slip up to which each is predicted from the others, where there is one load.
+MOST_SLIP_LEVELS = 8
 #: Squared residual, in variances, of a prediction without equilibrium: ten standard deviations.
 INFEASIBLE_SQUARE = 100.0
 
@@ -95,7 +97,8 @@ def held_out_folds(readings: Readings, seed: int) -> dict[str, Folds]:
 
     Runs are predicted from the others, where there are at least three; the highest loads, or the
     highest slips where the load hardly varies, from the rest, where at least three loads or three
-    slips were measured.
+    slips were measured. Where neither runs nor loads are three, each slip is predicted from the
+    others too.
     """
     parts, runs = {}, len(readings.runs)
     if runs >= 3:
@@ -106,6 +109,10 @@ def held_out_folds(readings: Readings, seed: int) -> dict[str, Folds]:
         name, out = region
         description = f"{name}, predicted from the rest"
         parts[REGION] = Folds(description, out.astype(np.int64), np.asarray([1]))
+    slips = readings.slip_levels
+    if runs < 3 and readings.load_levels.count < 3 and slips.count >= 3:
+        fold = slips.index * min(slips.count, MOST_SLIP_LEVELS) // slips.count
+        parts[SLIPS] = Folds("every slip predicted by fits to the others", fold, np.unique(fold))
     return parts
 
 

@@ -25,6 +25,7 @@ PARTS = {
     "train": "fitted rows",
     "held_out_runs": "held-out runs",
     "held_out_region": "held-out region",
+    "held_out_slips": "held-out slips",
 }
 
 
