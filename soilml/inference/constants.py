@@ -61,8 +61,7 @@ NEAR = 9.0
 #: a fit. Within 4, two effects that explain more together than alone were missed; within 9, two of
 #: 45 sets (seed 62, one plan in 20) lost a right name to sets of three.
 NEAR_SET = 6.0
-#: The same for first looks: optima of the soil alone, and fits without a discrepancy that may hide
-#: their effects.
+#: The same for first looks at optima of the soil alone.
 NEAR_AT_FIRST = 50.0
 #: Decrease of -2 ln p by a linearised step that counts without a fit; what promises more is fitted.
 TRUSTED = 4.0
@@ -79,8 +78,7 @@ EXTENDED = 6
 START_SIZE = 0.7
 #: Distance from an end of its prior, as a fraction, at which a soil parameter presses against it.
 PRESSED = 0.02
-#: Amplitude of a discrepancy, in usual ones, from which it can hide an effect that explains nearly
-#: everything, and from which the priors of the soil are opened.
+#: Amplitude of a discrepancy, in usual ones, from which the priors of the soil are opened.
 LARGE_DISCREPANCY = 3.0
 
 # ---- the answer

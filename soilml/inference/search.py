@@ -41,9 +41,6 @@ Booleans = NDArray[np.bool_]
 
 #: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
 SOIL_STARTS = (0.5, 0.25)
-#: Share of the distance from the middle of its prior at which a soil parameter starts again: one at
-#: a bound would stay there.
-INWARD = 0.8
 #: Step of the ladder, of the logarithm of the discrepancy.
 LESS_DISCREPANCY = 1.0
 #: Amplitudes and scatter below the first (the logarithm below the second) count less where they
@@ -122,10 +119,6 @@ class Search:
         if not self.nodes:
             raise InputError("the model cannot be fitted to these rows")
         self._choose_autocorrelation(self.nodes[SOIL_ALONE])
-        soil = self.nodes[SOIL_ALONE]
-        large = self.terms.amplitude(soil.beside.at).max(initial=0.0) > constants.LARGE_DISCREPANCY
-        if large and soil.beside.trusted < soil.without.trusted:
-            self._fit_hidden(soil, best)
 
     refused: Solution | None = None
 
@@ -140,32 +133,6 @@ class Search:
             )
             if new.value < self.nodes[node.hypothesis].value:
                 self.nodes[node.hypothesis] = new
-
-    def _fit_hidden(self, soil: Explanation, plain: Solution) -> None:
-        """Fit the likeliest single effects without a discrepancy, which can hide them.
-
-        A large discrepancy is a local optimum: beside it, an effect that explains nearly everything
-        is not needed. They are predicted from the soil alone under noise and scatter.
-        """
-        at, linear = soil.without.at, plain.linearisation
-        fit = self.fit(StartedFit(SOIL_ALONE, plain.start_values(), at, soil.outliers, linear))
-        if isinstance(fit, InputError):
-            return
-        model = linear_model(self.terms, fit, soil.outliers)
-        at = model.best(at).at
-        half = np.where(np.arange(len(at.log)) >= self.terms.groups, 0.5 * at.log, at.log)
-        alone = replace(soil, fit=fit, linear=model)
-        found = additions(self, alone, [at, replace(at, log=half)])
-        singles = [own for h, own in found.items() if len(h.effects) == 1]
-        jobs: list[StartedFit] = []
-        for own in sorted(singles, key=_by_value)[: 2 * constants.FITS]:
-            start = {path: 0.5 + INWARD * (x - 0.5) for path, x in own.start.items()}
-            known = {job.hypothesis.effects for job in jobs}
-            if own.hypothesis.effects not in known or len(jobs) < 3:
-                jobs.append(replace(own, start=start, outliers=soil.outliers))
-            if len(jobs) == constants.FITS:
-                break
-        self._settle(jobs, float("inf"), constants.NEAR_AT_FIRST)
 
     def beside(self, fixed: Floats, inner: Sequence[Floats]) -> Search:
         """The hypotheses that are drawn from, fitted beside further Gaussian terms.
@@ -247,9 +214,7 @@ class Search:
         node.value = float(-2.0 * log) + self.problem.penalty(hypothesis)
         return node
 
-    def _settle(
-        self, jobs: Sequence[StartedFit], lowest: float, margin: float = constants.NEAR
-    ) -> None:
+    def _settle(self, jobs: Sequence[StartedFit], lowest: float) -> None:
         """Fit, estimate hyperparameters, and repeat while these move and the node is near.
 
         lowest: The value of the best node so far.
@@ -264,7 +229,7 @@ class Search:
                 try:
                     known = found.get(job.hypothesis)
                     node = self.node(job.hypothesis, fit, job.at, job.outliers, known)
-                    if node.value < lowest + margin:
+                    if node.value < lowest + constants.NEAR:
                         outliers = self._outliers(node)
                         if (outliers != job.outliers).any():
                             node = self.node(job.hypothesis, fit, node.at, outliers, node)
@@ -277,7 +242,7 @@ class Search:
                 moved = _distance(self.terms, job.at, target) > constants.WORTH_A_FIT
                 moved = moved or bool((node.outliers != job.outliers).any())
                 promised = node.promising.promised > constants.WORTH_A_FIT
-                if node.hoped < lowest + margin and (moved or promised):
+                if node.hoped < lowest + constants.NEAR and (moved or promised):
                     start, near = fit.start_values(), fit.linearisation
                     again.append(StartedFit(job.hypothesis, start, target, node.outliers, near))
             jobs = again
