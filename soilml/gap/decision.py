@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,21 +13,14 @@ from soilml.inference import constants
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Names, Posterior
 from soilml.remarks import Remark
-from soilml.report.numbers import format_quantity
+from soilml.report.numbers import format_probability, format_quantity
 
 LISTED_SUSPECTS = 8  # Suspects that are listed
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = Remark("not-decisive", "the evidence is not decisive beside the model's usual error")
 #: Why an explanation that the evidence supports is not claimed, by codes.
 _DOUBTS = {
-    "implausible-fault": "{} would be an implausibly large fault: check the sensor or the rig",
     "implausible-size": "{} would have to be implausibly large: its law or the cause is another",
-    "not-predictive": "{} predicts rows kept back no better than the soil alone: it fits the rows, "
-    "but so does a smooth remainder",
-    "other-law": "the law of {} would differ much from the catalogue's: the cause may be one that "
-    "the catalogue lacks",
-    "not-catalogued": "a large discrepancy is left beside {}: at least four times the usual error "
-    "of a model",
     "unchecked-fault": "{} is a fault that nothing has checked: a law that the catalogue lacks may "
     "look like it; check it, and state the check with --checked",
 }
@@ -72,12 +65,9 @@ def not_rejected(posterior: Posterior, ranked: Sequence[Names]) -> tuple[Names, 
     return tuple(n for n in kept if not any(set(other) < set(n) for other in kept))
 
 
-def decide(
-    posterior: Posterior, gains: Mapping[Names, float], obstacles: Sequence[Remark]
-) -> Decision:
+def decide(posterior: Posterior, obstacles: Sequence[Remark]) -> Decision:
     """The status of a report where a gap is likely; see `soilml.gap.statuses.STATUSES`.
 
-    gains: Log density of rows kept back by the first sets, above that of the soil alone.
     obstacles: Why these runs cannot identify a cause.
     """
     none, reasons = posterior.no_effect, tuple(obstacles)
@@ -88,9 +78,11 @@ def decide(
     other_soil = alone and alone.hypothesis.wide_priors and alone.share_without > 0.5
     if other_soil and none > max(constants.UNCERTAIN, chance):
         return Decision("undecided", reasons=(soil_outside_priors(posterior),))
-    hopeless = 1.0 - constants.UNCERTAIN if obstacles else 0.0
-    if not ranked or (none > constants.UNCERTAIN and none > max(chance, hopeless)):
-        return Decision("not-testable" if obstacles else "unknown", reasons=reasons)
+    smooth = none - posterior.no_gap  # a gap that a smooth error explains
+    if obstacles and (not ranked or none > 1.0 - constants.UNCERTAIN):
+        return Decision("not-testable", reasons=reasons)
+    if not ranked or (not obstacles and none > constants.UNCERTAIN and smooth > chance):
+        return Decision("unknown")
     listed = not_rejected(posterior, ranked)
     best = listed[0]
     node = posterior.node_of(best)
@@ -98,10 +90,12 @@ def decide(
     suspected = Decision("suspected", (), listed, node, reasons)
     if obstacles:
         return suspected
-    if doubt := _doubt(posterior, node, gains.get(best, np.inf)):
-        return replace(suspected, reasons=(doubt,))
+    if oversized(node.fit):
+        return replace(suspected, reasons=(_reason("implausible-size", best),))
     if none > constants.UNCERTAIN:
-        return replace(suspected, reasons=(NOT_DECISIVE,))
+        gap = 1.0 - posterior.no_gap
+        why = gap_not_certain(gap) if gap < 1.0 - constants.UNCERTAIN else NOT_DECISIVE
+        return replace(suspected, reasons=(why,))
     if chance >= constants.NAMED_PROBABILITY:
         # an offset of one channel imitates what no catalogue has, such as a crust on the soil: a
         # check of the sensor shows a fault, rows alone do not
@@ -112,13 +106,19 @@ def decide(
         status = "named"
         if node.share_without < constants.LIKELIER:
             status = "partly-named"
-        elif node.hypothesis.free_law and law_matters(posterior, node):
+        elif node.hypothesis.free_law:
             status = "form-open"
         return Decision(status, (best,), listed[:1], node)
     together = sum(posterior.sets[names] for names in listed)
     if none <= constants.CHANCE and len(listed) > 1 and together >= constants.LIKELIER:
         return Decision("class", listed, listed, node)
     return replace(suspected, reasons=(NOT_DECISIVE,))
+
+
+def gap_not_certain(probability: float) -> Remark:
+    """Why nothing is named where there may be no gap."""
+    text = f"that there is a gap is not certain (probability {format_probability(probability)})"
+    return Remark("gap-not-certain", text)
 
 
 def pressed_priors(fit: Solution) -> dict[str, str]:
@@ -158,41 +158,15 @@ def _reason(code: str, names: Names) -> Remark:
     return Remark(code, _DOUBTS[code].format(" + ".join(names)), names)
 
 
-def _doubt(posterior: Posterior, node: Explanation, gain: float) -> Remark | None:
-    """Why an explanation is not claimed, whatever its probability is."""
-    names = node.hypothesis.effects
-    deviation = np.abs(node.fit.x) * np.sqrt(node.fit.precision)
-    faults = tuple(
-        c.effect
-        for c, d in zip(node.fit.coordinates, deviation, strict=True)
-        if c.effect and not c.is_shape and d > constants.MAX_SIZE_DEVIATION
-    )
-    if faults:
-        return _reason("implausible-fault", faults)
-    if implausible_sizes(node.fit):
-        return _reason("implausible-size", names)
-    if not gain > 0.0:
-        return _reason("not-predictive", names)
-    amplitude = posterior.terms.amplitude(node.at)
-    if amplitude.max(initial=0.0) >= constants.LARGE_REMAINDER:
-        return _reason("not-catalogued", names)
-    if posterior.by_other_law(node.hypothesis):
-        return _reason("other-law", names)
-    return None
-
-
-def implausible_sizes(fit: Solution) -> dict[str, float]:
-    """Sizes, in usual ones, of the effects of soil and gear that are far larger, by name."""
-    return {
-        c.effect: float(abs(x))
+def oversized(fit: Solution) -> bool:
+    """Whether an effect of soil or gear is far larger than usual ones."""
+    return any(
+        c.effect and not c.is_shape and np.isinf(c.std) and abs(x) > constants.LARGEST_SIZE
         for c, x in zip(fit.coordinates, fit.x, strict=True)
-        if c.effect and not c.is_shape and np.isinf(c.std) and abs(x) > constants.LARGEST_SIZE
-    }
+    )
 
 
-def suspects(
-    posterior: Posterior, decision: Decision, gains: Mapping[Names, float]
-) -> list[Suspect]:
+def suspects(posterior: Posterior, decision: Decision) -> list[Suspect]:
     """Explanations with their odds against all others, the first one that is shown first."""
     ranked = ranked_sets(posterior)
     first = decision.listed[:1] or tuple(ranked[:1])
@@ -200,30 +174,6 @@ def suspects(
     rest = [n for n in rest if not any(set(n) <= set(o) or set(o) < set(n) for o in first)]
     found = []
     for names in [*first, *rest[: LISTED_SUSPECTS - 1]]:
-        node, odds = posterior.node_of(names), posterior.log_odds(*names)
-        sizes = {} if node is None else implausible_sizes(node.fit)
-        chance = posterior.probability(*names)
-        found.append(Suspect(names, odds, chance, gains.get(names), sizes))
+        odds, chance = posterior.log_odds(*names), posterior.probability(*names)
+        found.append(Suspect(names, odds, chance))
     return found
-
-
-def law_matters(posterior: Posterior, node: Explanation) -> bool:
-    """Whether the free law and the catalogue's differ in the measured range by more than matters.
-
-    They differ if, in some channel, the root mean square difference of their predictions exceeds
-    both the standard error of a mean over the readings of that channel and the range of the channel
-    times `constants.NEGLIGIBLE_FRACTION`. Without a fit of the catalogue's law they do.
-    """
-    readings, own = posterior.terms.readings, node.hypothesis
-    catalogue = posterior.search.nodes.get(replace(own, free_law=False))
-    if catalogue is None:
-        return True
-    difference = node.fit.prediction - catalogue.fit.prediction
-    for i in range(len(readings.channels)):
-        in_channel = readings.channel == i
-        rms = np.sqrt(np.mean(difference[in_channel] ** 2))
-        mean_error = np.sqrt(np.mean(posterior.std[in_channel] ** 2) / in_channel.sum())
-        span = np.ptp(np.append(readings.measured[in_channel], 0.0))
-        if rms > max(mean_error, constants.NEGLIGIBLE_FRACTION * span):
-            return True
-    return False

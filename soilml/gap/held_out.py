@@ -19,7 +19,7 @@ from soilml.gap.results import BeforeAfter, GapReduction
 from soilml.inference.evidence import LinearisedFit
 from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import Hyperparameters, scatter_columns, terms_like
-from soilml.inference.posterior import Names, Posterior
+from soilml.inference.posterior import Posterior
 from soilml.inference.search import SOIL_STARTS
 from soilml.io.table import Table
 from soilml.quantities import column
@@ -151,23 +151,6 @@ def predicted_by_refits(
                 if (solved := descent_if_any(problem, fit.x, fit.linearisation)) is not None:
                     mean[name][out] = solved.prediction[out]
     return means
-
-
-def predictive_gains(posterior: Posterior, sets: Sequence[Names], seed: int) -> dict[Names, float]:
-    """Log density of rows kept back by sets of effects, above that of the soil alone.
-
-    Mean over the parts. Both are beside their remainders, which are told by all readings, and so is
-    the scatter. Where each slip is predicted, its ends are among them, and the region of high slips
-    does not count again. Empty where nothing can be kept back.
-    """
-    parts = held_out_folds(posterior.terms.readings, seed)
-    counted = [folds for part, folds in parts.items() if part != REGION or SLIPS not in parts]
-
-    known = {names: node for names in sets if (node := posterior.node_of(names)) is not None}
-    if not counted or not known:
-        return {}
-    alone = log_score(posterior.soil.linear, posterior.soil.at, counted)
-    return {n: log_score(node.linear, node.at, counted) - alone for n, node in known.items()}
 
 
 def log_score(model: LinearisedFit, at: Hyperparameters, parts: Iterable[Folds]) -> float:

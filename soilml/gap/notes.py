@@ -14,7 +14,7 @@ from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
 from soilml.quantities import column
 from soilml.remarks import Remark
-from soilml.report.numbers import channel_name, decimal
+from soilml.report.numbers import decimal
 
 LISTED_OUTLIERS = 6  # Outliers that a note lists by name
 NOTABLE_NOISE_SCALE = 1.25  # Factor on the declared noise above which a note is made
@@ -100,16 +100,6 @@ def _large_noise(posterior: Posterior, soil: Solution) -> Iterator[Remark]:
                 "hides small gaps"
             )
             yield Remark("noise-too-large", text, (column(name),))
-
-
-def one_channel(posterior: Posterior) -> Iterator[Remark]:
-    """Of one channel: the effects that would change others alone."""
-    channels = posterior.terms.readings.channels
-    hidden = [name for name, why in posterior.search.untestable.items() if why.code == "no-change"]
-    if len(channels) == 1 and hidden:
-        measured = channel_name(column(channels[0]))
-        text = f"only {measured} was measured: {', '.join(hidden)} would not show"
-        yield Remark("hidden-effect", text, tuple(hidden), "note")
 
 
 def indistinct(report: GapReport, posterior: Posterior, fixed: Sequence[str]) -> list[Remark]:

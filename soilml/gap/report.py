@@ -9,7 +9,6 @@ import numpy as np
 
 from soilml.gap.pictures import bars_picture, map_picture, remainder_picture
 from soilml.gap.results import GapReport
-from soilml.gap.sentences import needed_sizes
 from soilml.gap.statuses import STATUSES
 from soilml.io.text_tables import csv_text
 from soilml.remarks import texts
@@ -98,18 +97,6 @@ def _tables(found: GapReport) -> Iterator[ReportTable]:
         yield _discrepancy(found)
     if found.next_runs:
         yield _next_runs(found)
-    if found.soil_tests:
-        tests, units = found.soil_tests, [test["unit"] for test in found.soil_tests]
-        yield ReportTable(
-            "Tests of the soil",
-            [
-                Column("test", [t["label"] for t in tests]),
-                Column("measured", [t["measured"] for t in tests], units, digits=3),
-                Column("soil alone, sigma off", [t["sigma_before"] for t in tests], digits=2),
-                Column("soil after, sigma off", [t["sigma_after"] for t in tests], digits=2),
-            ],
-            "Distances in standard deviations of what such tests scatter from place to place.",
-        )
     if entries := found.variance_components:
         size = ["rad" if name == "friction_angle_std" else "1" for name in entries]
         yield ReportTable(
@@ -125,14 +112,10 @@ def _tables(found: GapReport) -> Iterator[ReportTable]:
 def _suspects(found: GapReport) -> ReportTable:
     """The likeliest explanations, those that are claimed first."""
     shown = found.suspects[:_LISTED]
-    gains = [np.nan if s.predictive_gain is None else s.predictive_gain for s in shown]
     columns = [
         Column("effects", [" + ".join(s.effects) for s in shown]),
         Column("probability", [s.probability for s in shown], digits=2),
-        Column("ln(density kept back)", gains, digits=3),
     ]
-    if any(s.times_usual for s in shown):
-        columns.append(Column("needs", [needed_sizes(s.times_usual) for s in shown]))
     note = (
         f"Probability of a gap {found.gap_probability:.2f}, of a cause outside the catalogue "
         f"{found.outside_probability:.2f}."

@@ -10,7 +10,6 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.fitted_readings import FittedReadings
-from soilml.physics.soils.soil_tests import deviations
 from soilml.remarks import Remark
 from soilml.report.numbers import format_residual
 from soilml.results import EstimatedValue, Result
@@ -47,11 +46,6 @@ class Suspect:
     effects: tuple[str, ...]
     log_odds: float  # natural logarithm, within the catalogue
     probability: float  # that these effects are present, causes outside the catalogue included
-    #: Logarithm of the density of rows kept back, above that of the soil alone, both beside a
-    #: smooth remainder; None where no row was kept back for it
-    predictive_gain: float | None = None
-    #: Sizes of its effects that are implausibly large, in usual ones, by name
-    times_usual: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -232,10 +226,10 @@ class GapReport(Result):
 
     @property
     def first(self) -> tuple[str, ...]:
-        """The effects that are claimed, else those of the first suspect."""
+        """The effects whose figures are shown: those that are claimed, else first suspected."""
         if self.effects:
             return tuple(e.name for e in self.effects)
-        return self.suspects[0].effects if self.suspects else ()
+        return self.cause_set[0] if self.cause_set else ()
 
     def report(self) -> Report:
         """Verdict, soil and effects, readings beside the model, where it disagrees, and by what."""
@@ -273,28 +267,11 @@ class GapReport(Result):
             "unit": [v.unit for v in found.values()],
         }
 
-    @property
-    def soil_tests(self) -> list[dict[str, Any]]:
-        """Each test of the model's soil, and how far the soil before and after is from it.
-
-        `sigma_before` and `sigma_after` are in standard deviations of its logarithm.
-        """
-        tests, sigmas = self.model.soil_tests, []
-        for soil in (self.soil_before, self.soil_after):
-            values = np.asarray([estimate.value for estimate in soil.values()])
-            sigmas.append(deviations(tests, self.model.soil, list(soil), values).tolist())
-        names = ("label", "unit", "measured", "sigma_before", "sigma_after")
-        return [
-            dict(zip(names, (test.label(), test.unit, test.measured, *both), strict=True))
-            for test, *both in zip(tests, *sigmas, strict=True)
-        ]
-
     def as_json(self) -> dict[str, Any]:
         """The content of gap.json."""
         from soilml import __version__
 
-        more = {"soil_tests": self.soil_tests, "soilml_version": __version__}
-        return {**as_json_entry(self), **more}
+        return {**as_json_entry(self), "soilml_version": __version__}
 
 
 def as_json_entry(value: Any) -> Any:

@@ -7,7 +7,7 @@ the reasons, the notes and the tables.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from string import Formatter
 
 from soilml.gap.results import GapReport, NextRun
@@ -49,11 +49,9 @@ def headline(report: GapReport) -> str:
 
 def _sure(report: GapReport) -> str:
     """The probability of what is named, as the middle of a sentence."""
-    chances, large = [e.probability for e in report.effects], ""
-    if not chances and report.suspects:
-        chances = [report.suspects[0].probability]
-        large = ", implausibly large" if report.suspects[0].times_usual else ""
-    return f" (probability {format_probability(min(chances))}{large})" if chances else ""
+    chances = [e.probability for e in report.effects]
+    chances = chances or [s.probability for s in report.suspects[:1]]
+    return f" (probability {format_probability(min(chances))})" if chances else ""
 
 
 def _shrinks(report: GapReport) -> str:
@@ -113,12 +111,6 @@ _WORDS = {
 }
 
 
-def needed_sizes(times_usual: Mapping[str, float]) -> str:
-    """Implausible sizes that an explanation needs, in words; empty where it needs none."""
-    sizes = times_usual.items()
-    return " and ".join(f"{name} at {decimal(x, 2)} times its usual size" for name, x in sizes)
-
-
 def listed_explanations(report: GapReport) -> str:
     """The explanations that remain, the likeliest first, and whether the cause may be none of them.
 
@@ -137,8 +129,6 @@ def listed_explanations(report: GapReport) -> str:
         if not stated:
             return ""
         said = f"Suspects, the likeliest first, with their probabilities: {'; '.join(parts)}."
-        if needed := needed_sizes(stated[0].times_usual):
-            said += f" The first needs {needed}."
     elif status != "unknown":
         return ""
     if (outside := report.outside_probability) >= NOTABLE_OUTSIDE:

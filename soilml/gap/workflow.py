@@ -20,8 +20,8 @@ from soilml.fitting.predictions import forces
 from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.usable_readings import prepared_rows
 from soilml.gap.cause_of_remainder import described_cause
-from soilml.gap.checks import estimate_repeat_noise, faults_of, naming_obstacles
-from soilml.gap.decision import Decision, decide, opened_priors, ranked_sets, suspects
+from soilml.gap.checks import faults_of, naming_obstacles
+from soilml.gap.decision import Decision, decide, opened_priors, suspects
 from soilml.gap.disagreements import disagreements
 from soilml.gap.estimates import (
     named_effects,
@@ -36,12 +36,11 @@ from soilml.gap.held_out import (
     plain_fits,
     plain_soil,
     predict_held_out,
-    predictive_gains,
     split_holdout,
     without_grown,
 )
 from soilml.gap.next_runs import competing_explanations, next_runs
-from soilml.gap.notes import analysis_notes, indistinct, one_channel, outlier_names
+from soilml.gap.notes import analysis_notes, indistinct, outlier_names
 from soilml.gap.remainder import discrepancy_map, remaining_discrepancy
 from soilml.gap.results import GapReduction, GapReport
 from soilml.gap.sentences import headline, report_lines
@@ -59,8 +58,6 @@ from soilml.row_status import Status
 
 #: Readings that an analysis may have: its columns are as long, and there are some for each run.
 MOST_READINGS = 3600
-#: Explanations that are scored on rows kept back, the likeliest first.
-SCORED = 4
 #: Share of outliers above which they form a pattern, so that the data cannot be analysed, and
 #: outliers that the reason states.
 MAX_OUTLIER_FRACTION, OUTLIERS_STATED = 0.1, 3
@@ -148,10 +145,8 @@ def gap(
     split = split_holdout(table, holdout, seed)
     soil = free_soil_parameters(case, free)
 
-    readings = stack_readings(case, split.analysed)
-    repeat_noise, notes = estimate_repeat_noise(readings)
-    readings = readings.with_default_std(repeat_noise).with_known_noise()
-    notes = [*remarks, *notes, *readings.notes]
+    readings = stack_readings(case, split.analysed).with_known_noise()
+    notes = [*remarks, *readings.notes]
     if faults := tuple(faults_of(readings, len(soil))):
         return _bad_data_report(case, faults, notes, seed)
     obstacles = tuple(naming_obstacles(readings, len(soil)))
@@ -163,7 +158,7 @@ def gap(
             return _bad_data_report(case, (error,), notes, seed)
         held_out = None
         if split.held_out is not None:
-            held_out = stack_readings(case, split.held_out).with_default_std(repeat_noise)
+            held_out = stack_readings(case, split.held_out)
             held_out = held_out.subset(np.isfinite(held_out.std))
         report = _build_report(case, posterior, obstacles, notes, split, held_out, readings, seed)
     if report.model.remainder not in (None, case.remainder):
@@ -228,14 +223,12 @@ def _build_report(
     alone, kept = plain_soil(posterior), ~posterior.outliers
     fits = alone, alone
     misfit = declared_misfit(case, readings.subset(kept), posterior.problem.soil, alone.x)
-    gains = {}
     if quiet:
         figures = figures_of(fits)
         found = disagreements(posterior, case, misfit, alone, figures)
         decision = Decision("undecided" if found else "no-gap", reasons=tuple(found))
     else:
-        gains = predictive_gains(posterior, ranked_sets(posterior)[:SCORED], seed)
-        decision = decide(posterior, gains, (*opened_priors(posterior), *naming))
+        decision = decide(posterior, (*opened_priors(posterior), *naming))
         fits = plain_fits(posterior, alone, decision.shown)
         figures = figures_of(fits)
     shown = decision.shown
@@ -262,7 +255,6 @@ def _build_report(
             *analysis_notes(
                 posterior, alone, whole or shown or posterior.soil, split.analysed.place
             ),
-            *(one_channel(posterior) if decision.status == "no-gap" else ()),
         ),
         variance_components=variance_component_entries(posterior),
         misfit=None if misfit is None else misfit.per_freedom,
@@ -272,9 +264,9 @@ def _build_report(
         seed=seed,
         curves=FittedReadings.of_solutions(*fits, posterior.std),
     )
-    if decision.status in ("no-gap", "undecided"):
+    if decision.status == "no-gap":
         return report
-    listed = suspects(posterior, decision, gains)
+    listed = suspects(posterior, decision)
     explained = shown if claimed and shown is not None else posterior.soil
     rivals = competing_explanations(posterior, decision, listed)
     return replace(

@@ -114,7 +114,7 @@ def _by_catalogue(
 ) -> dict[Hypothesis, StartedFit]:
     """The hypothesis by the catalogue's laws, where that with free ones is a node.
 
-    Whether the catalogue's laws explain too decides how far free ones count for an effect.
+    A fit from there reaches optima that predictions from the soil alone miss.
     """
     if not node.hypothesis.free_law:
         return {}

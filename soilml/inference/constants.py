@@ -61,8 +61,7 @@ NEAR = 9.0
 #: a fit. Within 4, two effects that explain more together than alone were missed; within 9, two of
 #: 45 sets (seed 62, one plan in 20) lost a right name to sets of three.
 NEAR_SET = 6.0
-#: The same for first looks: optima of the soil alone, and fits without a discrepancy that may hide
-#: their effects.
+#: The same for first looks at optima of the soil alone.
 NEAR_AT_FIRST = 50.0
 #: Decrease of -2 ln p by a linearised step that counts without a fit; what promises more is fitted.
 TRUSTED = 4.0
@@ -79,8 +78,7 @@ EXTENDED = 6
 START_SIZE = 0.7
 #: Distance from an end of its prior, as a fraction, at which a soil parameter presses against it.
 PRESSED = 0.02
-#: Amplitude of a discrepancy, in usual ones, from which it can hide an effect that explains nearly
-#: everything, and from which the priors of the soil are opened.
+#: Amplitude of a discrepancy, in usual ones, from which the priors of the soil are opened.
 LARGE_DISCREPANCY = 3.0
 
 # ---- the answer
@@ -94,12 +92,6 @@ UNLIKELY_MODEL = 0.01
 NEGLIGIBLE_DISCREPANCY = 0.3
 #: Probability that an effect of the catalogue is the right description of a cause that it explains.
 IN_CATALOGUE = 0.97
-#: Share of the explanations by another law than the catalogue's that are right: of an effect whose
-#: own law explains no more than the soil alone, another cause may be at work.
-OTHER_LAW_RIGHT = 0.3
-#: Squared distance of the shapes from the catalogue's law, in prior variances, up to which a free
-#: law is still the catalogue's.
-FAR_LAW = 1.0
 #: Factor on intervals about their mean: what the discrepancy of each channel cannot imitate, and
 #: what Laplace's approximation of the hyperparameters leaves out. Calibrated on the sample.
 INTERVAL_FACTOR = 1.35
@@ -121,14 +113,5 @@ NAMED_PROBABILITY = 0.9
 UNCERTAIN, CHANCE = 0.2, 0.05
 #: Odds against the likeliest set below which another one is rejected.
 REJECTED = 0.03
-#: Amplitude of a remaining discrepancy, in usual ones, beside which nothing is named: 8 % of a
-#: range.
-LARGE_REMAINDER = 4.0
-#: Size of a sensor's or the rig's fault, in prior standard deviations, above which it explains
-#: nothing: a gain error of 24 % without calibration.
-MAX_SIZE_DEVIATION = 4.0
-#: Difference of the predictions of two laws, as a fraction of a channel's range, below which the
-#: law does not matter: that of a usual model error.
-NEGLIGIBLE_FRACTION = 0.02
 #: Probability that the explanations of a returned model together have, and how many it has at most.
 HELD, MOST_RETURNED = 0.95, 12

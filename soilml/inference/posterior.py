@@ -18,7 +18,7 @@ from soilml.inference.draws import DRAWS, Component, Draws, marginal, proposals,
 from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import GaussianTerms, Hyperparameters
 from soilml.inference.priors import unknown_cause
-from soilml.inference.problem import SOIL_ALONE, Hypothesis, InferenceProblem
+from soilml.inference.problem import SOIL_ALONE, InferenceProblem
 from soilml.inference.search import Search
 from soilml.results import EstimatedValue
 
@@ -123,8 +123,8 @@ class Posterior:
         return np.asarray(terms.columns[:, own] @ weights)
 
     @cached_property
-    def _weights(self) -> tuple[list[Names], Floats, Floats]:
-        """Effects, probability, and share that counts for the effects, of every hypothesis."""
+    def _weights(self) -> tuple[list[Names], Floats]:
+        """Effects and probability of every hypothesis."""
         tried = self.search.nodes
         items = [(n.hypothesis, n.value) for n in self.nodes]
         items += [
@@ -135,21 +135,7 @@ class Posterior:
         values = np.asarray([value for _, value in items])
         weights = np.exp(-0.5 * (values - values.min()))
         weights /= weights.sum()
-        shares = [constants.OTHER_LAW_RIGHT if self.by_other_law(h) else 1.0 for h, _ in items]
-        return [h.effects for h, _ in items], weights, np.asarray(shares)
-
-    @cached_property
-    def _by_law(self) -> dict[tuple[Names, bool], float]:
-        """The lowest value of each set of effects, with the catalogue's laws and with free ones."""
-        values: dict[tuple[Names, bool], float] = {}
-        for h, own in [
-            *((h, p.value) for h, p in self.search.predicted.items()),
-            *((n.hypothesis, n.value) for n in self.nodes[::-1]),
-        ]:
-            if h in self.search.nodes or len(h.effects) == 1:
-                key = h.effects, h.free_law
-                values[key] = min(own, values.get(key, np.inf))
-        return values
+        return [h.effects for h, _ in items], weights
 
     @cached_property
     def only_channel(self) -> dict[str, str]:
@@ -163,28 +149,6 @@ class Posterior:
                 found[s.name] = readings.channels[largest]
         return found
 
-    def by_other_law(self, hypothesis: Hypothesis) -> bool:
-        """Whether a hypothesis explains only by another law than the catalogue's.
-
-        The catalogue's laws explain no more than a part of its effects does, and the free ones are
-        far from them, or its effects change one channel alone: any force, and any error of that
-        channel, is such a law.
-        """
-        if not hypothesis.free_law:
-            return False
-        names, values = hypothesis.effects, self._by_law
-        parts = [v for (n, free), v in values.items() if not free and set(n) < set(names)]
-        if values.get((names, False), np.inf) <= min(parts, default=np.inf):
-            return False
-        node = self.search.nodes.get(hypothesis)
-        several = len(self.terms.readings.channels) > 1
-        one_channel = several and all(name in self.only_channel for name in names)
-        if node is None or one_channel:
-            return True
-        fit, shapes = node.fit, [i for i, c in enumerate(node.fit.coordinates) if c.is_shape]
-        # squared distance of the shapes from the catalogue's laws, in prior variances
-        return float(np.sum(fit.x[shapes] ** 2 * fit.precision[shapes])) > constants.FAR_LAW
-
     def node_weight(self, node: Explanation) -> float:
         """Probability of a fitted hypothesis."""
         return float(self._weights[1][self.nodes.index(node)])
@@ -193,8 +157,8 @@ class Posterior:
     def sets(self) -> dict[Names, float]:
         """Probability of exactly these effects within the catalogue, the likeliest first."""
         found: dict[Names, float] = {}
-        for names, weight, share in zip(*self._weights, strict=True):
-            found[names] = found.get(names, 0.0) + float(weight * share)
+        for names, weight in zip(*self._weights, strict=True):
+            found[names] = found.get(names, 0.0) + float(weight)
         return dict(sorted(found.items(), key=lambda item: (-item[1], item[0])))
 
     @cached_property
@@ -232,9 +196,8 @@ class Posterior:
     def outside(self) -> float:
         """Probability of a gap with a cause that no effect of the catalogue describes.
 
-        That is a discrepancy beside the soil alone; and beside effects, a law far from the
-        catalogue's, an amplitude that is likelier of an unknown cause than of a usual error, or a
-        signature that an effect imitates.
+        That is a discrepancy beside the soil alone; and beside effects, an amplitude that is
+        likelier of an unknown cause than of a usual error, or a signature that an effect imitates.
         """
         found = 0.0
         for node, weight in zip(self.nodes, self._weights[1], strict=False):
@@ -242,10 +205,9 @@ class Posterior:
             if not node.hypothesis.effects:
                 found += weight * present
                 continue
-            share = constants.OTHER_LAW_RIGHT if self.by_other_law(node.hypothesis) else 1.0
             amplitude = np.exp(node.beside.at.log[: self.terms.channels])
             usual = 1.0 - present * unknown_cause(amplitude)
-            found += weight * (1.0 - constants.IN_CATALOGUE * share * usual)
+            found += weight * (1.0 - constants.IN_CATALOGUE * usual)
         return float(found)
 
     def within(self, effects: Collection[str]) -> float:

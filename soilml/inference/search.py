@@ -2,8 +2,8 @@
 
 A node is a hypothesis that was fitted. From each node near the best one, the evidence of every
 addition (an effect, free laws, opened priors) is predicted by a linear model, under a ladder of
-hyperparameters that it may lead to: as fitted, without discrepancy, with less of it, with hardly
-any scatter. The best are fitted, in turn with their hyperparameters, until nothing is left to fit.
+hyperparameters that it may lead to: as fitted, without discrepancy, with less of it. The best are
+fitted, in turn with their hyperparameters, until nothing is left to fit.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ from soilml.inference.explanation import Explanation, StartedFit
 from soilml.inference.gaussian_terms import (
     DISCREPANCY,
     FIRST_AMPLITUDE,
-    SCATTER,
     GaussianTerms,
     Hyperparameters,
     gaussian_terms,
@@ -42,12 +41,8 @@ Booleans = NDArray[np.bool_]
 
 #: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
 SOIL_STARTS = (0.5, 0.25)
-#: Share of the distance from the middle of its prior at which a soil parameter starts again: one at
-#: a bound would stay there.
-INWARD = 0.8
-#: Steps of the ladder: of the logarithm of the discrepancy, and the logarithm of hardly any
-#: scatter; scatter above the third counts as some.
-LESS_DISCREPANCY, LITTLE_SCATTER, SOME_SCATTER = 1.0, -1.5, -0.7
+#: Step of the ladder, of the logarithm of the discrepancy.
+LESS_DISCREPANCY = 1.0
 #: Amplitudes and scatter below the first (the logarithm below the second) count less where they
 #: change.
 SMALL, USUAL, OF_SMALL = 0.3, -0.5, 0.2
@@ -124,10 +119,6 @@ class Search:
         if not self.nodes:
             raise InputError("the model cannot be fitted to these rows")
         self._choose_autocorrelation(self.nodes[SOIL_ALONE])
-        soil = self.nodes[SOIL_ALONE]
-        large = self.terms.amplitude(soil.beside.at).max(initial=0.0) > constants.LARGE_DISCREPANCY
-        if large and soil.beside.trusted < soil.without.trusted:
-            self._fit_hidden(soil, best)
 
     refused: Solution | None = None
 
@@ -142,32 +133,6 @@ class Search:
             )
             if new.value < self.nodes[node.hypothesis].value:
                 self.nodes[node.hypothesis] = new
-
-    def _fit_hidden(self, soil: Explanation, plain: Solution) -> None:
-        """Fit the likeliest single effects without a discrepancy, which can hide them.
-
-        A large discrepancy is a local optimum: beside it, an effect that explains nearly everything
-        is not needed. They are predicted from the soil alone under noise and scatter.
-        """
-        at, linear = soil.without.at, plain.linearisation
-        fit = self.fit(StartedFit(SOIL_ALONE, plain.start_values(), at, soil.outliers, linear))
-        if isinstance(fit, InputError):
-            return
-        model = linear_model(self.terms, fit, soil.outliers)
-        at = model.best(at).at
-        half = np.where(np.arange(len(at.log)) >= self.terms.groups, 0.5 * at.log, at.log)
-        alone = replace(soil, fit=fit, linear=model)
-        found = additions(self, alone, [at, replace(at, log=half)])
-        singles = [own for h, own in found.items() if len(h.effects) == 1]
-        jobs: list[StartedFit] = []
-        for own in sorted(singles, key=_by_value)[: 2 * constants.FITS]:
-            start = {path: 0.5 + INWARD * (x - 0.5) for path, x in own.start.items()}
-            known = {job.hypothesis.effects for job in jobs}
-            if own.hypothesis.effects not in known or len(jobs) < 3:
-                jobs.append(replace(own, start=start, outliers=soil.outliers))
-            if len(jobs) == constants.FITS:
-                break
-        self._settle(jobs, float("inf"), constants.NEAR_AT_FIRST)
 
     def beside(self, fixed: Floats, inner: Sequence[Floats]) -> Search:
         """The hypotheses that are drawn from, fitted beside further Gaussian terms.
@@ -249,9 +214,7 @@ class Search:
         node.value = float(-2.0 * log) + self.problem.penalty(hypothesis)
         return node
 
-    def _settle(
-        self, jobs: Sequence[StartedFit], lowest: float, margin: float = constants.NEAR
-    ) -> None:
+    def _settle(self, jobs: Sequence[StartedFit], lowest: float) -> None:
         """Fit, estimate hyperparameters, and repeat while these move and the node is near.
 
         lowest: The value of the best node so far.
@@ -266,7 +229,7 @@ class Search:
                 try:
                     known = found.get(job.hypothesis)
                     node = self.node(job.hypothesis, fit, job.at, job.outliers, known)
-                    if node.value < lowest + margin:
+                    if node.value < lowest + constants.NEAR:
                         outliers = self._outliers(node)
                         if (outliers != job.outliers).any():
                             node = self.node(job.hypothesis, fit, node.at, outliers, node)
@@ -279,7 +242,7 @@ class Search:
                 moved = _distance(self.terms, job.at, target) > constants.WORTH_A_FIT
                 moved = moved or bool((node.outliers != job.outliers).any())
                 promised = node.promising.promised > constants.WORTH_A_FIT
-                if node.hoped < lowest + margin and (moved or promised):
+                if node.hoped < lowest + constants.NEAR and (moved or promised):
                     start, near = fit.start_values(), fit.linearisation
                     again.append(StartedFit(job.hypothesis, start, target, node.outliers, near))
             jobs = again
@@ -334,16 +297,11 @@ class Search:
         return sorted(set(chosen), key=_by_value)
 
     def _ladder(self, node: Explanation) -> list[Hyperparameters]:
-        """Hyperparameters that an addition may lead to: less discrepancy, or less scatter."""
-        beside, without = node.beside.at, node.without.at
-        kinds = self.terms.of_kind(DISCREPANCY), self.terms.of_kind(SCATTER)
-        less = np.where(kinds[0], beside.log - LESS_DISCREPANCY, beside.log)
-        found = [beside, without, replace(beside, log=less)]
-        if max(beside.log[kinds[1]].max(), without.log[kinds[1]].max()) > SOME_SCATTER:
-            for at in (beside, without):
-                still = np.where(kinds[1], np.minimum(at.log, LITTLE_SCATTER), at.log)
-                found.append(replace(at, log=still))
-        return found
+        """Hyperparameters that an addition may lead to: those of a node, or less discrepancy."""
+        beside = node.beside.at
+        own = self.terms.of_kind(DISCREPANCY)
+        less = np.where(own, beside.log - LESS_DISCREPANCY, beside.log)
+        return [beside, node.without.at, replace(beside, log=less)]
 
 
 def _by_value(predicted: StartedFit) -> tuple[float, Hypothesis]:

@@ -116,7 +116,7 @@ def test_a_cause_that_no_catalogue_has_is_not_named_alone():
 def test_an_unclaimed_best_fit_is_not_in_the_model():
     report = analysed("stick-slip")
     assert report.status == "unknown"
-    assert report.first and report.model.model.effects == ()
+    assert report.suspects and report.model.model.effects == ()
 
 
 @pytest.mark.parametrize(

