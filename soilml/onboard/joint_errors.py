@@ -35,7 +35,6 @@ class JointErrors:
     these errors.
 
     correlation (m, m): R, about zero.
-    alone: The file that is better alone than the combination; None where the combination is better.
     centre, gain: The combination's distance from the centre is multiplied by the gain: each
         estimate is drawn towards the mean of the prior, and the combination of two is drawn too
         far.
@@ -49,7 +48,6 @@ class JointErrors:
     """
 
     correlation: Floats
-    alone: int | None
     centre: float
     gain: float
     std_scale: float
@@ -64,13 +62,10 @@ class JointErrors:
         difference.
         """
         disagreement = _disagreement(mean, std, self.correlation)
-        if self.alone is None:
-            fused = best_linear(mean, std, self.correlation)
-            centre, spread = self.centre + self.gain * (fused.mean - self.centre), fused.std
-        else:
-            centre, spread = mean[self.alone], std[self.alone]
+        fused = best_linear(mean, std, self.correlation)
         widening = np.maximum(1.0, disagreement / DISAGREEMENT)
-        return centre, self.std_scale * widening * spread, disagreement
+        centre = self.centre + self.gain * (fused.mean - self.centre)
+        return centre, self.std_scale * widening * fused.std, disagreement
 
     def interval(self, mean: Floats, std: Floats) -> tuple[Floats, Floats]:
         """Ends (n,) of the 90 % interval of fused means and standard deviations (n,)."""
@@ -124,23 +119,18 @@ def _measure(truth: Floats, mean: Floats, std: Floats) -> JointErrors:
     moments = z @ z.T
     size = np.sqrt(np.diag(moments))
     centre, none = float(truth.mean()), np.zeros(0)
-    plain = JointErrors(
-        _positive(moments / np.outer(size, size)), None, centre, 1.0, 1.0, none, none, none
-    )
+    plain = JointErrors(_positive(moments / np.outer(size, size)), centre, 1.0, 1.0, *[none] * 3)
     away = plain.fuse(mean, std)[0] - centre
     few = len(truth) < MANY_ROWS
     gain = 1.0 if few else float(away @ (truth - centre) / (away @ away))
     together = replace(plain, gain=gain)
-    candidates = [together, *(replace(plain, alone=i) for i in range(len(mean)))]
-    error = [np.mean((c.fuse(mean, std)[0] - truth) ** 2) for c in candidates]
-    best = candidates[int(np.argmin(error))]
-    fused, spread, _ = best.fuse(mean, std)
+    fused, spread, _ = together.fuse(mean, std)
     scale = float(np.sqrt(np.mean(((truth - fused) / spread) ** 2)))
     residual = (truth - fused) / (scale * spread)
     bins = max(min(BINS, len(truth) // LEAST_ROWS_OF_BIN), 1) if few else BINS
     pieces = np.array_split(np.argsort(fused, kind="stable"), bins)
     rule = replace(
-        best,
+        together,
         std_scale=scale,
         middles=np.asarray([fused[piece].mean() for piece in pieces]),
         low=np.asarray([min(_quantile(residual[piece], 0.05), 0.0) for piece in pieces]),

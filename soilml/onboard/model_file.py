@@ -39,9 +39,8 @@ MOST_BYTES = 256 << 20
 #: What the reading of malformed metadata raises.
 DAMAGED = (AttributeError, KeyError, OverflowError, RecursionError, TypeError, ValueError)
 _MOST_SHOWN = 40  # Characters of an entry of the metadata that a message shows
-#: The metadata entry `soilml_kind` of a graph of one step, which other programs feed.
-ONE_STEP = "step"
-SLIP_STEP = "slip-step"  # The same of a slip filter, which `SlipStream` runs
+#: The metadata entry `soilml_kind` of a slip filter, which `SlipStream` runs.
+SLIP_STEP = "slip-step"
 
 
 def released_models() -> dict[str, Path]:
@@ -105,11 +104,6 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
         raise ModelFileError(
             f"{file} has interface {_shown(interface)}; this version of soilml reads up to "
             f"{INTERFACE}: update soilml"
-        )
-    if metadata.get("soilml_kind") == ONE_STEP:
-        raise ModelFileError(
-            f"{file} is one step of a stream, written by an earlier soilml for other programs; "
-            "needed is the file that it was made from"
         )
     _check_intact(file, content, metadata)
     return session, metadata

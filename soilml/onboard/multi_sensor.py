@@ -49,8 +49,7 @@ def fuse_estimates(estimates: Sequence[Estimate]) -> MultiSensorEstimate:
     """Fuse estimates of the same quantities and prior, of a file for each of several sensors.
 
     They are weighed by variance under the correlation of their errors, which files trained from the
-    same data carry (`soilml.onboard.joint_errors`). Where one file alone was better on the held-out
-    rows, the fused estimate is that file's. Its intervals are calibrated on held-out rows.
+    same data carry (`soilml.onboard.joint_errors`). Intervals are calibrated on held-out rows.
 
     Estimates out of range are not used. A single remaining one is returned unchanged. Where none
     remains, or where two differ by more than `CONTRADICTION` standard deviations of their

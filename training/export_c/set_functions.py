@@ -186,7 +186,6 @@ def set_functions(
     places = {posterior["limit"]: "work->limit", posterior["size"]: "work->size"}
     if LIKELIEST in graph.given:
         places[graph.given[LIKELIEST]["std"]] = "work->std"
-        places[first["unknowns"]] = "work->unknowns"
     whole = graph.function("set_graph", total, places)
     values = _values(graph, interface, rows)
     points = values["POINTS"]
@@ -265,9 +264,12 @@ def _values(graph: _SetGraph, interface: Interface, rows: int) -> dict[str, Any]
         "log_probabilities": of_posterior("log_probabilities"),
     }  # fmt: skip
     if zs:
-        named = {"sampled_part": "part", "linear_powers": "powers"}
-        named |= {"linear_derivatives": "derivatives"}
-        arrays |= {key: graph.constant(LIKELIEST, name) for key, name in named.items()}
+        part, *of_z = (
+            graph.constant(LIKELIEST, name) for name in ("part", "powers", "derivatives")
+        )
+        arrays["sampled_part"] = np.argsort(order)[part]
+        arrays |= dict(zip(("linear_powers", "linear_derivatives"), of_z, strict=True))
+        del arrays["column_of"]
     numbers = {name.lower(): number for name, number in vars(sampler).items() if name.isupper()} | {
         "targets": int(of_posterior("targets").flat[0]), "damping": sampler.DAMPING_STD**-2,
         "least_jacobian": 1.0 - LARGEST_TANH**2,
@@ -279,19 +281,20 @@ def _work_members(values: Mapping[str, Any], columns: int, rows: int) -> dict[st
     """Members of the working memory that the sampler needs, of float, with their sizes."""
     v = values
     first, most = v["FIRST"], max(v["WIDTH"], columns, 2 * v["ERRORS"] + 7)
-    unknowns = v["MONOMIALS"] * (v["TERMS"] + v["LINEAR"]) if v["LINEAR"] else v["MONOMIALS"]
     numbers = {
         "of_row": CHANNELS * columns, "of_counts": 3, "counted": 3, "limit": 1, "size": 1,
         "misfit": 1, "change": most, "squares": v["WIDTH"],
         "monomials": max(v["TERMS"], v["ERRORS"]) * v["TILE"],
         "points": (1 + v["UNKNOWNS"]) * v["POINTS"], "weights": v["POINTS"],
-        "soil": v["MONOMIALS"], "unknowns": unknowns, "std": max(v["LINEAR"], 1),
-        "drawn": first, "outside": first, "log_weight": first, "least": first, "first_least": first,
-        "total": first, "parts": v["SCALES"] * first, "of_scale": v["SCALES"],
+        "soil": v["MONOMIALS"], "drawn": first, "outside": first, "log_weight": first,
+        "least": first, "first_least": first, "total": first,
+        "parts": v["SCALES"] * first, "of_scale": v["SCALES"],
         "whitening": v["SCALES"] * v["ERRORS"] ** 2,
         "mean": v["ERRORS"] * max(v["WIDTH"], 2 * v["ERRORS"] + 7),
         "unbounded": max(v["UNKNOWNS"] - 1, 1) * v["ADAPTED"], "fresh": CHANNELS * rows * columns,
     }  # fmt: skip
+    if zs := v["LINEAR"]:
+        numbers |= {"of_z": v["MONOMIALS"], "changes": zs * v["MONOMIALS"], "unit": zs, "std": zs}
     return {member: (count,) for member, count in numbers.items()}
 
 

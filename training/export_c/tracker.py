@@ -35,7 +35,7 @@ def tracker_values(
     recent = min(row_window.RECENT_ROWS, length // 2)
     fresh = len(RESPONSE_CHANNELS) * filter_state.MOST_ROWS
     size = 2 * memory_bytes + (system_rows + fresh) * interface.columns * 4
-    size += (blocks + recent + filter_state.MOST_ROWS) * BYTES_OF_A_ROW
+    size += (blocks + filter_state.MOST_ROWS) * BYTES_OF_A_ROW
     parts = [noise_of(f"{name}_std", noise) for name in watched]
     own = {
         "length": length,

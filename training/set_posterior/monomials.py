@@ -60,17 +60,6 @@ def derivative(terms: Terms, coordinate: int) -> Floats:
     return matrix
 
 
-def pair_factors(terms: Terms) -> list[tuple[tuple[int, int], ...]]:
-    """Each monomial as a product of pairs of coordinates, at least two; all have as many pairs.
-
-    A graph computes a table of all pairs that occur once, and multiplies entries of it: of degree
-    four, each monomial costs one multiplication instead of three.
-    """
-    length = max(4, len(terms[0]) + len(terms[0]) % 2)
-    padded = [(ONE,) * (length - len(term)) + term for term in terms]
-    return [tuple((term[i], term[i + 1]) for i in range(0, length, 2)) for term in padded]
-
-
 def select_terms(x: Floats, y: Floats, terms: Terms, count: int) -> Terms:
     r"""The `count` terms that are left when the least useful one is taken out again and again.
 

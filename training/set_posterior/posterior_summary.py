@@ -109,23 +109,12 @@ def _quantiles(deviations: Value, std: Value, weights: Value, **_: Value) -> lis
     relative = (deviations / spacing.reshape(-1, 1)).reshape(0, 1, -1)
     below = ((GRID + 0.5)[:, None] - relative).clip(0.0, 1.0)
     distribution = (below @ weights.reshape(-1, 1)).reshape(0, len(GRID))
-    # columns of these matrices are the segments: of the lower half of the grid for the lower
-    # quantile, then of the upper half for the upper quantile
-    minus_start, increment = np.zeros((2, len(GRID), 2 * segments))
-    of_end = np.zeros((2 * segments, 2))
-    for end in range(2):
-        for i in range(segments):
-            segment, point = end * segments + i, end * (segments + 1) + i
-            minus_start[point, segment] = -1.0
-            increment[point, segment], increment[point + 1, segment] = -1.0, 1.0
-            of_end[segment, end] = 1.0
-    remaining = gemm(distribution, minus_start, np.repeat(INTERVAL, segments))
-    passed = remaining / maximum(distribution @ increment, LEAST_SHARE)
-    first_points = GRID[[0, segments + 1]][:, None]
-    whole = gemm(
-        constant(std.graph, of_end.T), passed.clip(0.0, 1.0), first_points, transpose_b=True
-    )
-    return [whole * spacing]
+    ends = []
+    for begin, probability in zip((0, len(DISTANCES)), INTERVAL, strict=True):
+        low, high = (distribution.columns(begin + k, begin + k + segments) for k in (0, 1))
+        passed = (probability - low) / maximum(high - low, LEAST_SHARE)
+        ends.append(passed.clip(0.0, 1.0).sum(axis=1, keepdims=False) + float(GRID[begin]))
+    return [concat(ends, axis=0).reshape(2, -1) * spacing]
 
 
 ZERO_FACTOR = 1e-30  # Stands for a factor of zero, of which the logarithm is taken

@@ -95,7 +95,8 @@ class ResidualRows:
             and the other errors are taken; None is the middle of the prior's range, and the system
             is then without columns of errors of the model.
         """
-        slopes = self.values.slopes_at(basis)
+        middle = constant(self.weight.graph, np.eye(len(self.response.terms), 1))
+        slopes = self.values.slopes_at(middle if basis is None else basis)
         of_residuals = self._slopes_of_residuals(slopes)
         parts = [self.values.coefficients, self._sensor_columns(of_residuals)]
         if basis is not None:

@@ -38,17 +38,15 @@ class ResponseValues:
     tangent: Value  # (d, hidden, rows) derivatives of the last hidden layer along d directions
     #: last layer (terms * channels, hidden + channels), whose last columns take the offset off
     layer: Value
-    middle: Floats  # (channels, hidden) the same at the middle of the prior's range
+    units: int  # hidden
 
-    def slopes_at(self, basis: Value | None) -> Value:
-        """Derivatives (d, channels, rows) of the channels at one soil along the directions.
+    def slopes_at(self, basis: Value) -> Value:
+        """Derivatives (d, channels, rows) of the channels along the directions, at one soil.
 
-        The soil is given by its monomials (terms, 1); None is the middle of the prior's range.
-        They are exact: each layer carries the tangents of its values.
+        The soil is given by its monomials (terms, 1). The derivatives are exact: each layer carries
+        the tangents of its values.
         """
-        if basis is None:
-            return self.middle @ self.tangent
-        units = self.middle.shape[1]
+        units = self.units
         by_term = self.layer.reshape(-1, CHANNELS * (units + CHANNELS))
         at_soil = gemm(basis, by_term, transpose_a=True).reshape(CHANNELS, -1)
         return at_soil.split([units, CHANNELS], axis=1)[0] @ self.tangent
@@ -153,7 +151,7 @@ class Response:
         layer = constant(graph, whole, name="response_last")
         bias = constant(graph, self.layers[-1][:, None], name="response_last_bias")
         output = gemm(layer, concat([layers[-1][1], offset], axis=0), bias)
-        return ResponseValues(output.reshape(terms, -1), tangent, layer, last[:CHANNELS])
+        return ResponseValues(output.reshape(terms, -1), tangent, layer, last.shape[1])
 
     def _add_hidden(self, features: Value, name: str) -> list[tuple[Value, Value]]:
         """Weights (units, inputs) and values (units, rows) of all layers but the last.

@@ -54,7 +54,7 @@ from training.onnx_graph.value import (
 )
 from training.set_posterior.draws import LARGEST_TANH, ProposalDraws, SampleSizes
 from training.set_posterior.families.coordinates import PriorAxis
-from training.set_posterior.monomials import Terms, derivative, pair_factors
+from training.set_posterior.monomials import Terms, derivative
 from training.set_posterior.scale_mixture import PointMisfit, Scaled
 
 #: Gauss-Newton steps along the solved axis in the prior round, from 0; in adapted rounds there is
@@ -105,30 +105,16 @@ class Polynomials:
         return len(self.order)
 
     @property
-    def powers(self) -> NDArray[np.int64]:
-        """Powers of the solved coordinate, (terms,)."""
-        return np.asarray([term.count(self.order[-1] + 1) for term in self.terms], np.int64)
-
-    @property
     def rows(self) -> NDArray[np.int64]:
         """Rows of a point that each monomial multiplies, (terms, factors)."""
         row_of = [0, *(1 + self.order.index(i) for i in range(self.unknowns))]
         return np.asarray([[row_of[k] for k in term] for term in self.terms], np.int64)
 
     def basis(self, points: Value) -> Value:
-        """Monomials (terms, n) at points (1 + p, n), as products of pairs of coordinates."""
+        """Monomials (terms, n) at points (1 + p, n)."""
 
         def body(points: Value) -> list[Value]:
-            row_of = [0, *(1 + self.order.index(i) for i in range(self.unknowns))]
-            factors = pair_factors(self.terms)
-            pairs = sorted({pair for term in factors for pair in term})
-            left, right = (points.take([row_of[pair[k]] for pair in pairs], axis=0) for k in (0, 1))
-            table = left * right
-            per_term = [
-                table.take([pairs.index(term[k]) for term in factors], axis=0)
-                for k in range(len(factors[0]))
-            ]
-            return [reduce(mul, per_term)]
+            return [reduce(mul, (points.take(rows, axis=0) for rows in self.rows.T.tolist()))]
 
         return composite("Monomials", ["monomials"], body, points=points)[0]
 
@@ -221,14 +207,7 @@ def tempered(boxed: Value, outside: Value) -> tuple[Value, Value]:
 def first_round(
     polynomials: Polynomials, system: Value, draws: Value, t: Value, log_prior: Value
 ) -> list[Value]:
-    r"""The round of draws of the prior, for residuals (m, terms) of a model without errors.
-
-    Residuals along the solved coordinate s have constant other coordinates:
-
-    .. math:: r(s) = r_0 + r_1 s + A_2 (m \circ s^k), \qquad
-        r'(s) = r_1 + A_2 (k m \circ s^{k-1}), \qquad k \ge 2
-
-    with the columns of the system by their power k of s, and the monomials m of the others.
+    """The round of draws of the prior, for residuals (m, terms) of a model without errors.
 
     draws: Unbounded other coordinates (p - 1, n).
     t, log_prior: Draws for the solved coordinate, and the log of prior over proposal, (1, n).
@@ -237,34 +216,16 @@ def first_round(
     without the readings, and what is taken off outside the box, (1, n) each.
     """
     others, ones = tanh(draws), t * 0.0 + 1.0
-    powers = polynomials.powers
-    monomials = polynomials.basis(concat([ones, others, ones], axis=0))
-    places = [np.flatnonzero(powers == 0), np.flatnonzero(powers == 1), np.flatnonzero(powers > 1)]
-    by_power = system.take(np.concatenate(places).tolist(), axis=1)
-    columns = by_power.split([len(own) for own in places], axis=1)
-    parts = [monomials.take(own.tolist(), axis=0) for own in places]
-    fixed, linear = (columns[k] @ parts[k] for k in (0, 1))
-    higher, of_higher = columns[2], parts[2]
-
-    def of_powers(solved: Value) -> Value:
-        found = [solved]
-        while len(found) < powers.max() - 1:
-            found.append(found[-1] * solved)
-        return concat(found, axis=0).take((powers[places[2]] - 2).tolist(), axis=0) * of_higher
-
-    def residuals(solved: Value) -> Value:
-        return gemm(higher, of_powers(solved) * solved, fixed + linear * solved)
-
-    solved, precision = gauss_newton(constant(draws.graph, 0.0), fixed, linear)
-    for _ in range(PRIOR_STEPS - 1):
-        slope = gemm(higher * powers[places[2]], of_powers(solved), linear)
-        solved, precision = gauss_newton(solved, residuals(solved), slope)
+    solved = t * 0.0
+    for _ in range(PRIOR_STEPS):
+        basis = polynomials.basis(concat([ones, others, solved], axis=0))
+        slope = polynomials.slope(system, basis)
+        solved, precision = gauss_newton(solved, system @ basis, slope)
     solved, part, outside = proposed(polynomials, solved, precision, t)
-    free = log_prior + part
-    boxed = free - residuals(solved).sum_of_squares(axis=0, keepdims=True) * 0.5
-    weights, _ = tempered(boxed, outside)
-    mean = gemm(concat([ones, others, solved], axis=0), weights, transpose_b=True)
-    return [polynomials.basis(mean), solved, free, outside]
+    points = concat([ones, others, solved], axis=0)
+    residuals, free = system @ polynomials.basis(points), log_prior + part
+    weights, _ = tempered(free - residuals.sum_of_squares(axis=0, keepdims=True) * 0.5, outside)
+    return [polynomials.basis(gemm(points, weights, transpose_b=True)), solved, free, outside]
 
 
 def adapted_round(

@@ -1,4 +1,4 @@
-"""The rows that a tracker remembers: blocks of them, the last ones as they were read."""
+"""The rows that a tracker remembers: blocks of them, the last ones of one row each."""
 
 from __future__ import annotations
 
@@ -8,27 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from soilml.onboard.memory import Memory
-from soilml.onboard.tracking.misfit import Rows
 
 BLOCKS = 16  # Blocks of a window that is full; one more grows until the oldest is forgotten
 #: Rows that must disagree with those before, and agree with each other, for another soil.
 LEAST_ROWS = 3
 #: Last rows that are kept one by one, so that a change among them is found where it began.
 RECENT_ROWS = 24
-#: Share of the rows known now that a recent row was read again with, so that it is not once more.
-ENOUGH_KNOWN = 0.75
-
-
-@dataclass(frozen=True)
-class RecentRows:
-    """Rows of a recent block as they were read.
-
-    rows: Row inputs of the graph (m,) by name.
-    known: Rows on which the soil rested at which their errors of sensors and model are linear.
-    """
-
-    rows: Rows
-    known: int
 
 
 @dataclass(frozen=True)
@@ -42,21 +27,19 @@ class RowWindow:
     memory: All rows of the blocks, packed.
     length: Rows that are remembered at least, once there were so many.
     added: What each of the last rows added to the misfit, (recent,).
-    recent: The same rows as they were read, (recent,).
     """
 
     blocks: tuple[Memory, ...]
     memory: Memory
     length: int
     added: tuple[float, ...] = ()
-    recent: tuple[RecentRows, ...] = ()
 
     @property
     def rows_per_block(self) -> int:
         """Rows after which another block begins, but for the last rows."""
         return -(-self.length // BLOCKS)
 
-    def with_rows(self, rows: Rows, after: Memory, added: float = 0.0) -> RowWindow:
+    def with_rows(self, after: Memory, added: float = 0.0) -> RowWindow:
         """The window with one more row, or its first ones, from its memory after them, not packed.
 
         added: What the row added to the misfit.
@@ -64,44 +47,18 @@ class RowWindow:
         system = after.system[len(self.memory.system) :]
         last = replace(after, system=system, counts=after.counts - self.memory.counts)
         blocks, rises = (*self.blocks, last), (*self.added, added)
-        recent = (*self.recent, RecentRows(rows, after.rows))
         if len(rises) > min(RECENT_ROWS, self.length // 2):
-            first, rises, recent = len(blocks) - len(rises), rises[1:], recent[1:]
+            first, rises = len(blocks) - len(rises), rises[1:]
             older, one = blocks[:first], blocks[first]
             if older and older[-1].rows < self.rows_per_block:
                 older, one = older[:-1], join((older[-1], one))
             blocks = (*older, one, *blocks[first + 1 :])
-        return replace(self, blocks=blocks, memory=after.packed(), added=rises, recent=recent)
-
-    @property
-    def least_known(self) -> int | None:
-        """The recent block whose errors are to be linear at another soil, if there is one.
-
-        It is that whose errors are linear at a soil of the fewest rows, if these are fewer than
-        `ENOUGH_KNOWN` of those now.
-        """
-        known = [one.known for one in self.recent]
-        if not known or min(known) >= ENOUGH_KNOWN * self.memory.rows:
-            return None
-        return len(self.blocks) - len(known) + known.index(min(known))
-
-    def read_again(self, block: int, after: Memory) -> RowWindow:
-        """The window with a recent block as it is in the memory `after`, behind all others.
-
-        `after` is not packed.
-        """
-        blocks, recent = list(self.blocks), list(self.recent)
-        place = block - len(blocks)
-        system = after.system[len(after.system) - len(blocks[block].system) :]
-        blocks[block] = replace(blocks[block], system=system)
-        recent[place] = replace(recent[place], known=after.rows)
-        return replace(self, blocks=tuple(blocks), memory=after.packed(), recent=tuple(recent))
+        return replace(self, blocks=blocks, memory=after.packed(), added=rises)
 
     def since(self, block: int) -> RowWindow:
         """The window without the blocks before this one."""
         blocks = self.blocks[block:]
-        added, recent = self.added[-len(blocks) :], self.recent[-len(blocks) :]
-        return replace(self, blocks=blocks, memory=join(blocks), added=added, recent=recent)
+        return replace(self, blocks=blocks, memory=join(blocks), added=self.added[-len(blocks) :])
 
     def suspect(self, excess: float) -> int:
         """The block with which another soil begins most likely: the last ones added most.

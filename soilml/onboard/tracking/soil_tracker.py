@@ -100,7 +100,7 @@ class SoilTracker:
     agree with each other, the soil has changed, and the tracker begins anew with them; where the
     next rows agree with those before, it was a glitch. Rows that differ from earlier ones only
     taken together are a drift, or a small change; the earlier ones are forgotten. Of the others,
-    the last `length` are remembered. Memory and time per row are bounded: at most five calls of the
+    the last `length` are remembered. Memory and time per row are bounded: at most four calls of the
     graph, one more for the fault detector, and one where rows are forgotten. Rows are judged with a
     model that is right but for more noise; the estimate has the errors of the estimator's model,
     and noise as large as the rows show.
@@ -249,27 +249,13 @@ class SoilTracker:
         since_drift = state.rows_since_drift
         self._filter = replace(
             state,
-            window=window.with_rows(row, fit.memory, misfit),
+            window=window.with_rows(fit.memory, misfit),
             question=question,
             rows_since_change=state.rows_since_change + 1,
             rows_since_drift=since_drift + 1 if 0 <= since_drift < self.length else -1,
         )
         self._fit = fit
-        self._read_again()
         return self._look_for_drift()
-
-    def _read_again(self) -> None:
-        """Take errors of rows as linear at the present soil where theirs was of far fewer rows."""
-        window = self._filter.window
-        block = window.least_known
-        if block is None or len(window.blocks) < 2:
-            return
-        others = join((*window.blocks[:block], *window.blocks[block + 1 :]))
-        as_read = window.recent[block - len(window.blocks)].rows
-        fit = fit_rows(self._judge, as_read, others)
-        if fit.readings == self._fit.readings:  # rounding may take a reading to the other side
-            self._filter = replace(self._filter, window=window.read_again(block, fit.memory))
-            self._fit = fit
 
     def _other_soil(self, words: str) -> TrackerState:
         """Whether the rows in question are of another soil."""
@@ -288,7 +274,7 @@ class SoilTracker:
     def _begin_with(self, rows: Rows, fit: JointFit, agree: bool) -> TrackerState:
         """Forget all but some rows in question."""
         count, earlier = len(rows["slip"]), self._filter.window.memory.rows
-        window = RowWindow((), self._empty, self.length).with_rows(rows, fit.memory)
+        window = RowWindow((), self._empty, self.length).with_rows(fit.memory)
         state = self._filter  # the size of the model error is kept
         kept = max(len(state.increases) - len(state.question.rows), 0)
         self._filter = FilterState(

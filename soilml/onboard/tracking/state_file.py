@@ -19,9 +19,9 @@ from soilml.onboard.memory import Memory
 from soilml.onboard.set_contract import Floats
 from soilml.onboard.tracking.filter_state import FilterState, RepeatedReadings, RowsInQuestion
 from soilml.onboard.tracking.misfit import Rows
-from soilml.onboard.tracking.row_window import RecentRows, RowWindow, join
+from soilml.onboard.tracking.row_window import RowWindow, join
 
-FORMAT = 6  # Version of the bytes
+FORMAT = 7  # Version of the bytes
 MOST_BYTES = 8 << 20  # Largest file. Those that are written have some 100 kB
 
 
@@ -96,11 +96,10 @@ def _state(entry: Mapping[str, Any], start: Memory) -> FilterState:
     """The inverse of `_plain`."""
     own, asked, repeated = entry["window"], entry["question"], entry["repeated"]
     blocks = tuple(_memory(block, start) for block in own["blocks"])
-    recent = tuple(RecentRows(_rows(one["rows"]), int(one["known"])) for one in own["recent"])
     memory = join(blocks) if blocks else start
     previous = repeated["previous"]
     return FilterState(
-        RowWindow(blocks, memory, own["length"], tuple(own["added"]), recent),
+        RowWindow(blocks, memory, own["length"], tuple(own["added"])),
         RowsInQuestion(
             tuple(map(_rows, asked["rows"])), tuple(asked["disagree"]), asked["in_succession"]
         ),

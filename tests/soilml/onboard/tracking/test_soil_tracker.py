@@ -67,23 +67,6 @@ def test_sound_rows_give_the_estimate_of_a_run(settled, wheel_sets, wheel_poster
     assert (settled.state.rows_remembered, settled.state.rows_since_change) == (40, 40)
 
 
-def test_errors_of_rows_are_linear_at_the_present_soil(wheel_sets):
-    noisy, apart = wheel_sets.on(noise={"slip": (SLIP_STD, 0.0)}), []
-    for seed in range(8):
-        day = simulate_day(seed, usual_errors=1.0)
-        tracker, memory = SoilTracker(noisy), noisy.start()
-        sound = [i for i in range(30) if day.kinds[i] is Kind.SOUND]
-        for i in sound:
-            state = tracker.read(**day.row(i))
-            stepped, memory = noisy.step(memory, **day.row(i))
-        assert state.rows_remembered == len(sound)
-        together = noisy.run(**{name: values[sound] for name, values in day.readings.items()})
-        means = np.stack([state.estimate.mean, stepped.mean])
-        apart.append(np.abs((means - together.mean) / together.std).max(axis=1))
-    tracked, as_they_arrived = np.mean(apart, axis=0)
-    assert tracked < 0.75 * as_they_arrived
-
-
 @pytest.mark.parametrize("factor", [2.0, 0.5, 0.0])
 def test_a_glitch_leaves_the_estimate_as_it_is(settled, wheel_posterior, factor):
     before = settled.state.estimate
