@@ -5,11 +5,12 @@ Values that differ by no more than their scatter are one level; see `find_levels
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from soilml.arrays import Floats, Integers
+from soilml.physics.operating_point import FROM_ORDER, Operating
 
 #: Two levels are apart by this many standard deviations of their values, plus the second figure
 #: divided by the number of values. In a simulation of 4 to 64 values of one normal or uniform
@@ -56,6 +57,9 @@ COVARIATE_RULES = {
     "pass_number": LevelRule(gap=0.5, fine_gap=0.5, scatter=0.1, step=1.0),
     "slip_angle": LevelRule(gap=0.02, fine_gap=0.02, scatter=0.01, step=0.05),
 }
+#: Rows are repeats of each other if their slips and the logarithms of their loads agree within
+#: these: torque then differs by about the noise of usual sensors.
+ALIKE_SLIP, ALIKE_LOG_LOAD = 0.02, 0.05
 #: Speed (m/s) below which the scale of speeds is linear, so that zero and reverse have a place.
 SLOW = 1e-3
 
@@ -166,3 +170,42 @@ def covariate_levels(field: str, values: Floats, run: Integers | None = None) ->
 def is_one_load(load: Floats) -> bool:
     """Whether all loads (n,), N, are of one level."""
     return load_levels(load).count == 1
+
+
+def replicate_rows(
+    at: Operating, run: Integers | None = None, slip_std: float = 0.0, load_std: float = 0.0
+) -> Integers:
+    """Groups of rows that are repeats of each other, (n,), numbered from 0.
+
+    Rows are replicates if their slips, loads and covariates are of the same levels, their slips
+    differ by at most `ALIKE_SLIP` and the logarithms of their loads by at most `ALIKE_LOG_LOAD`,
+    or by the measurement noise (`slip_std`, and `load_std` in N) where that is larger.
+    """
+    slip, load = (np.asarray(v, dtype=np.float64) for v in np.broadcast_arrays(at.slip, at.load))
+    slip_width = max(ALIKE_SLIP, CLEAR_GAP * slip_std)
+    load_width = max(ALIKE_LOG_LOAD, CLEAR_GAP * load_std / float(np.median(load)))
+    groups = [
+        _narrow_groups(slip, slip_levels(slip, run, slip_std), slip_width),
+        _narrow_groups(np.log(load), load_levels(load, run, load_std), load_width),
+    ]
+    for field in fields(at):
+        value = getattr(at, field.name)
+        if field.name in ("slip", "load", *FROM_ORDER) or value is None:
+            continue
+        value = np.broadcast_to(value, slip.shape)
+        if field.name in COVARIATE_RULES:
+            groups.append(covariate_levels(field.name, value, run).index)
+        else:
+            groups.append(np.unique(value, return_inverse=True)[1].reshape(-1))
+    _, joint = np.unique(np.stack(groups, axis=1), axis=0, return_inverse=True)
+    return np.asarray(joint, dtype=np.int64).reshape(-1)
+
+
+def _narrow_groups(values: Floats, levels: Levels, width: float) -> Integers:
+    """Groups (n,) of values of one level that differ by at most `width` from each other."""
+    group, first, last, number = np.zeros(len(values), dtype=np.int64), -np.inf, -1, -1
+    for i in np.argsort(values, kind="stable"):
+        if levels.index[i] != last or values[i] - first > width * (1.0 + 1e-9):
+            number, first, last = number + 1, values[i], int(levels.index[i])
+        group[i] = number
+    return group

@@ -14,7 +14,7 @@ from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError
-from soilml.fitting.levels import Levels, load_levels, slip_levels
+from soilml.fitting.levels import Levels, load_levels, replicate_rows, slip_levels
 from soilml.fitting.operating_points import gear_numbers, operating_points, operating_points_of_rows
 from soilml.fitting.shared_errors import declared_errors
 from soilml.io.table import Table
@@ -137,6 +137,12 @@ class Readings:
         levels = load_levels(self.row_load[row], self.run[row], typical_std(self.load_std))
         return replace(levels, index=levels.index[which])
 
+    @cached_property
+    def replicates(self) -> Integers:
+        """Groups of readings (m,) whose rows are replicates of each other, of all channels."""
+        slip_std, load_std = typical_std(self.slip_std), typical_std(self.load_std)
+        return replicate_rows(self.at, self.run, slip_std, load_std)[self.row]
+
     def of_rows(self, rows: Integers, at: Operating | None = None) -> tuple[Booleans, Readings]:
         """The readings of some rows, and which they are, (m,); `at` are their operating points."""
         position = np.full(len(self.run), -1)
@@ -239,7 +245,8 @@ class Readings:
         if not unknown or not kept:
             return self
         text = (
-            "{0} is not used: its noise is not declared; declare it in [noise], such as {0} = '3 %'"
+            "{0} is not used: its noise is not declared, nor do repeated rows tell it; declare it "
+            "in [noise], such as {0} = '3 %'"
         )
         notes = [Remark("unused-channel", text.format(key), (key,)) for key in unknown]
         return replace(self.of_channels(kept), notes=(*self.notes, *notes))

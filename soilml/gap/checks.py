@@ -10,6 +10,9 @@ from soilml.fitting.readings import LEAST_RELATIVE_STD, Readings
 from soilml.quantities import column
 from soilml.remarks import Remark
 
+#: Degrees of freedom that repeated rows must have for an estimate of the noise: its relative
+#: standard error is then 30 %.
+MIN_REPEAT_DEGREES_OF_FREEDOM = 6
 #: Readings beyond the number of soil parameters that an analysis needs, and that a name needs: with
 #: fewer, the noise cannot be told from the declared one.
 MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS = 4, 8
@@ -22,8 +25,8 @@ def faults_of(readings: Readings, parameters: int) -> Iterator[Remark]:
         values, std = readings.measured[own], readings.std[own]
         if not np.isfinite(std).all():
             text = (
-                f"the noise of {key} is not declared: give [noise] {key}, as in "
-                f'{key} = "2 %", or a column {key}_std'
+                f"the noise of {key} is not declared and there are no repeated rows to estimate "
+                f'it from: give [noise] {key}, as in {key} = "2 %", or a column {key}_std'
             )
             yield Remark("noise-undeclared", text, (key,))
         largest, most = float(np.abs(values).max(initial=0.0)), float(np.nanmax(std, initial=0.0))
@@ -61,3 +64,28 @@ def _few_readings(readings: Readings, parameters: int, least: int, what: str) ->
     count = "1 reading" if len(readings) == 1 else f"{len(readings)} readings"
     text = f"there are few readings: {count} for {parameters} soil parameters; at least "
     return Remark("few-readings", f"{text}{parameters + least} are needed{what}")
+
+
+def estimate_repeat_noise(readings: Readings) -> tuple[dict[str, float], list[Remark]]:
+    """Noise of the channels without declared noise, from repeated rows, and notes about it."""
+    noise, notes = {}, []
+    for i, name in enumerate(readings.channels):
+        own = np.flatnonzero((readings.channel == i) & ~np.isfinite(readings.std))
+        if not own.size:
+            continue
+        values, key = readings.measured[own], column(name)
+        _, group = np.unique(readings.replicates[own], return_inverse=True)
+        count = np.bincount(group)
+        freedom = int((count - 1).sum())
+        if freedom < MIN_REPEAT_DEGREES_OF_FREEDOM:
+            continue
+        squares = float(np.sum((values - (np.bincount(group, values) / count)[group]) ** 2))
+        std, begin = float(np.sqrt(squares / freedom)), f"noise of {key} is not declared"
+        if std <= LEAST_RELATIVE_STD * float(np.abs(values).max()):
+            text = f"{begin}, and its repeated rows are equal: none can be estimated from them"
+            notes.append(Remark("repeats-equal", text, (key,)))
+            continue
+        noise[name] = std
+        text = f"{begin}: {std:.3g} was estimated from repeated rows"
+        notes.append(Remark("noise-estimated", text, (key,), "note"))
+    return noise, notes

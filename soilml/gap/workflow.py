@@ -20,7 +20,7 @@ from soilml.fitting.predictions import forces
 from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.usable_readings import prepared_rows
 from soilml.gap.cause_of_remainder import described_cause
-from soilml.gap.checks import faults_of, naming_obstacles
+from soilml.gap.checks import estimate_repeat_noise, faults_of, naming_obstacles
 from soilml.gap.decision import Decision, decide, opened_priors, suspects
 from soilml.gap.disagreements import disagreements
 from soilml.gap.estimates import (
@@ -145,8 +145,10 @@ def gap(
     split = split_holdout(table, holdout, seed)
     soil = free_soil_parameters(case, free)
 
-    readings = stack_readings(case, split.analysed).with_known_noise()
-    notes = [*remarks, *readings.notes]
+    readings = stack_readings(case, split.analysed)
+    repeat_noise, notes = estimate_repeat_noise(readings)
+    readings = readings.with_default_std(repeat_noise).with_known_noise()
+    notes = [*remarks, *notes, *readings.notes]
     if faults := tuple(faults_of(readings, len(soil))):
         return _bad_data_report(case, faults, notes, seed)
     obstacles = tuple(naming_obstacles(readings, len(soil)))
@@ -158,7 +160,7 @@ def gap(
             return _bad_data_report(case, (error,), notes, seed)
         held_out = None
         if split.held_out is not None:
-            held_out = stack_readings(case, split.held_out)
+            held_out = stack_readings(case, split.held_out).with_default_std(repeat_noise)
             held_out = held_out.subset(np.isfinite(held_out.std))
         report = _build_report(case, posterior, obstacles, notes, split, held_out, readings, seed)
     if report.model.remainder not in (None, case.remainder):

@@ -14,6 +14,7 @@ from soilml.config.measurement_noise import Noise
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.fitting.readings import stack_readings, typical_std
+from soilml.gap.checks import estimate_repeat_noise
 from soilml.gap.held_out import RUNS_PER_HELD_OUT, split_holdout
 from soilml.io.table import Table
 from soilml.physics.gears.emulated import EmulatedGear
@@ -109,14 +110,15 @@ def _three_digits(x: float) -> float:
 def with_noise_of_log(case: Case, table: Table) -> Case:
     """The case with the noise of the log in those columns for which it declares none.
 
-    It is the median of `<column>_std`. Raises `InputError` where the noise of torque is not known,
-    and where no torque was measured.
+    It is the median of `<column>_std`, or else that of repeated rows. Raises `InputError` where the
+    noise of torque is known from neither, and where no torque was measured.
     """
     readings = stack_readings(case, table)
     if "torque" not in readings.channels:
         raise InputError(
             f"{table.source}: no row has torque_Nm, from which a file for the board estimates"
         )
+    readings = readings.with_default_std(estimate_repeat_noise(readings)[0])
     noise = dict(case.noise)
     for i, name in enumerate(readings.channels):
         std = readings.std[readings.channel == i]

@@ -6,8 +6,10 @@ import pytest
 from soilml.fitting.levels import (
     is_one_load,
     load_levels,
+    replicate_rows,
     slip_levels,
 )
+from soilml.physics.operating_point import Operating
 
 SEEDS = 100
 
@@ -59,3 +61,33 @@ def test_repeats_show_levels_that_are_set_more_finely():
     repeated = np.repeat(np.arange(4), 8)
     assert load_levels(load, repeated).count == 2
     assert load_levels(load, repeated % 2).count == 1  # one run of each: may be its scatter
+
+
+def test_rows_are_driven_alike_where_all_that_is_set_agrees():
+    at = Operating(
+        slip=np.asarray([0.30, 0.305, 0.30, 0.30, 0.45]),
+        load=np.asarray([60.0, 61.0, 60.5, 90.0, 60.0]),
+        speed=np.asarray([0.05, 0.05, -0.05, 0.05, 0.05]),
+    )
+    group = replicate_rows(at)
+    assert group[0] == group[1]
+    assert len(set(group.tolist())) == 4
+
+
+def test_rows_of_a_range_are_alike_only_where_they_are_close():
+    load = np.linspace(13.0, 30.0, 64)
+    group = replicate_rows(Operating(slip=np.full(64, 0.3), load=load))
+    widths = [np.ptp(np.log(load[group == i])) for i in range(group.max() + 1)]
+    assert max(widths) <= 0.0501 and group.max() > 10
+
+
+def test_rows_of_different_gears_or_passes_are_no_repeats():
+    at = Operating(
+        slip=np.asarray([0.2, 0.2, 0.2, 0.2, 0.5]),
+        load=np.full(5, 60.0),
+        gear=np.asarray(["wide", "lugged", "wide", "wide", "wide"]),
+        pass_number=np.asarray([1.0, 1.0, 1.0, 2.0, 1.0]),
+    )
+    found = replicate_rows(at, np.arange(5))
+    assert found.dtype == np.int64
+    assert found[0] == found[2] and len(set(found.tolist())) == 4

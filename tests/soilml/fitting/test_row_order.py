@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from soilml import EFFECTS, Case, Model, Wheel, simulate, soil
+from soilml.fitting.levels import replicate_rows
+from soilml.fitting.operating_points import operating_points
 from soilml.fitting.row_order import campaign_progress, with_order_columns
 from soilml.io.table import Table
 from soilml.physics.operating_point import FROM_ORDER
@@ -76,3 +78,11 @@ def test_simulated_rows_say_that_the_campaign_is_over():
     np.testing.assert_array_equal(
         simulated["torque_Nm"], simulate(PLAIN, slip=[0.1, 0.3], load=[60.0, 40.0])["torque_Nm"]
     )
+
+
+def test_rows_that_differ_in_their_order_alone_are_repeats():
+    columns = {"run": ["a"] * 12, "slip": [0.1, 0.3, 0.5] * 4, "load_N": [60.0] * 12}
+    columns = {name: np.asarray(values) for name, values in columns.items()}
+    table = with_order_columns(PLAIN, Table(columns), FROM_ORDER)
+    assert "progress" in table
+    assert np.unique(replicate_rows(operating_points(table))).size == 3

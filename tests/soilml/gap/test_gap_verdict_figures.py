@@ -13,6 +13,7 @@ from soilml.gap.run_options import (
     ROWS_PER_RUN,
     drivable_slips,
 )
+from soilml.remarks import texts
 
 
 def stub(**values):
@@ -51,6 +52,27 @@ def test_readings_for_three_parameters(count, fault, obstacle):
     assert [r.code for r in checks.faults_of(given, 3)] == ["few-readings"] * fault
     codes = {r.code for r in checks.naming_obstacles(given, 3)}
     assert codes == {"one-run"} | ({"few-readings"} if obstacle else set())
+
+
+def test_repeats_give_the_noise_by_their_degrees_of_freedom():
+    """Two groups of four: deviations of 1 and 2 about their means, six degrees of freedom."""
+    values = [9.0, 11.0, 9.0, 11.0, 18.0, 22.0, 18.0, 22.0]
+    given = stub(
+        channels=("torque",), channel=np.zeros(8, dtype=int), measured=np.asarray(values),
+        std=np.full(8, np.nan), replicates=np.repeat([3, 7], 4),
+    )  # fmt: skip
+    noise, notes = checks.estimate_repeat_noise(given)
+    assert noise == {"torque": pytest.approx(np.sqrt(20.0 / 6.0))}
+    assert texts(notes) == [
+        "noise of torque_Nm is not declared: 1.83 was estimated from repeated rows"
+    ]  # fmt: skip
+    few = stub(**vars(given) | {"replicates": np.asarray([3, 3, 3, 3, 7, 7, 7, 8])})
+    assert checks.estimate_repeat_noise(few) == ({}, [])
+    equal = stub(**vars(given) | {"measured": np.repeat([9.0, 18.0], 4)})
+    noise, notes = checks.estimate_repeat_noise(equal)
+    assert noise == {} and "its repeated rows are equal" in notes[0].text
+    known = stub(**vars(given) | {"std": np.ones(8)})
+    assert checks.estimate_repeat_noise(known) == ({}, [])
 
 
 @pytest.mark.parametrize(
