@@ -104,7 +104,7 @@ def identify(
     >>> rows = Table({"slip": slip, "load_N": load, "torque_Nm": torque})
     >>> fit = identify(case, rows)
     >>> print(f"{fit['friction_angle']:.3f} +- {fit.std[0]:.3f} rad")
-    0.499 +- 0.060 rad
+    0.500 +- 0.061 rad
     """
     case, table = as_case(case).without_explanations(), as_table(table)
     if method not in METHODS:
