@@ -173,7 +173,7 @@ def simulate_log(
     at = Operating(slip=np.asarray(slips, float), load=load)
     force, track = case.model(case.soil, at), case.model.gear
     belt = track.contact_geometry(np.asarray(force.sinkage), case.soil, at)
-    columns: dict[str, list[Any]] = {name: [] for name in (*LOG, *LASERS)}
+    columns: dict[str, list[Any]] = {name: [] for name in ("run", "time_s", *LOG[1:], *LASERS)}
     time = np.arange(0.0, 40.0, 0.05)
     tight = np.clip((time - 4.0) / 4.0, 0.0, 1.0)
     trims, rears = np.asarray(belt.trim), np.asarray(belt.rear)

@@ -25,6 +25,7 @@ from soilml.report.numbers import round_significant
 from soilml.results import EstimatedValue
 
 PRIOR_HALF_WIDTH = 3.0  # Half width of the prior of an effect's size, in standard deviations
+WEIGHT_DECIMALS = 4  # Of the weights of explanations in a model file
 
 
 def stds_of(node: Explanation) -> dict[str, float]:
@@ -99,19 +100,30 @@ def returned_case(posterior: Posterior, whole: Explanation | None, seed: int) ->
     itself has the mean soil and no effect; each explanation has its own. The smooth remainder is
     that of the mixture.
     """
-    parts = [] if whole is None else [(1.0, whole)]
-    for node in () if parts else posterior.nodes[: constants.MOST_RETURNED]:
-        parts.append((posterior.node_weight(node), node))
-        if sum(weight for weight, _ in parts) >= constants.HELD:
-            break
+    parts = likeliest(posterior) if whole is None else [(1.0, whole)]
     left, learned = discrepancy_amplitudes(posterior, parts), learned_remainder(posterior, parts)
     if whole is not None:
         return updated_case(whole, left, learned)
     alone = updated_case(posterior.soil, left, learned)
     mean = {p: round_significant(m.value) for p, m in posterior.soil_marginals(seed).items()}
-    each = tuple(CaseExplanation.of(round(w, 4), updated_case(node)) for w, node in parts)
+    each = tuple(
+        CaseExplanation.of(round(w, WEIGHT_DECIMALS), updated_case(node)) for w, node in parts
+    )
     prior = dict(posterior.problem.case.prior)
     return replace(alone, prior=prior, explanations=each).with_values(mean)
+
+
+def likeliest(posterior: Posterior) -> list[tuple[float, Explanation]]:
+    """The explanations of a mixture, with weights that are not nil in a file."""
+    parts: list[tuple[float, Explanation]] = []
+    for node in posterior.nodes[: constants.MOST_RETURNED]:
+        weight = posterior.node_weight(node)
+        if parts and round(weight, WEIGHT_DECIMALS) == 0.0:
+            break
+        parts.append((weight, node))
+        if sum(weight for weight, _ in parts) >= constants.HELD:
+            break
+    return parts
 
 
 def soil_before(fit: Solution) -> dict[str, EstimatedValue]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from unicodedata import combining, normalize
 
@@ -85,7 +85,7 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
         return None
     if any(n not in TEXT and n.removesuffix("_std") in COLUMNS for n in own.columns):
         return None
-    if kind := next((kind for kind in map(partial(_other_kind, own), own.columns) if kind), ""):
+    if kind := _other_kind(own):
         raise InputError(
             f"{name}: {kind} tests are not read; needed are plate or shear tests: of triaxial "
             "tests, give cohesion and friction_angle in [soil]"
@@ -166,13 +166,19 @@ def _complete(path: str, own: Recording, found: dict[str, Floats], taken: list[s
                 found[stress] = found.pop(force) / area
 
 
-def _other_kind(own: Recording, name: str) -> str:
-    """The kind of test that a column is of, where it is none that is read; "" else."""
-    if _says(name, "vane"):
+def _other_kind(own: Recording) -> str:
+    """The kind of tests of a table that are not read; "" of others.
+
+    A triaxial test has the stress of its cell, and beside it the axial one or the deviator.
+    """
+    if any(_says(n, "vane") for n in own.columns):
         return "vane"
-    words = words_of(name)
-    of_cell = _says(name, "deviator", "confining") or ({"sigma", "σ"} & {*words} and "3" in words)
-    return "triaxial" if of_cell and dimension(_unit(own, name)) == "Pa" else ""
+    stresses = [n for n in own.columns if dimension(_unit(own, n)) == "Pa"]
+    words = [{*words_of(n)} for n in stresses]
+    axes = {*"13"} & {w for of_one in words if of_one & {"sigma", "σ", "s"} for w in of_one}
+    of_cell = "3" in axes or any(_says(n, "confining") for n in stresses)
+    along = "1" in axes or any(_says(n, "deviator") for n in stresses)
+    return "triaxial" if of_cell and along else ""
 
 
 def _unit(own: Recording, name: str) -> str:

@@ -94,12 +94,13 @@ def read_source_soil(path: str | os.PathLike[str]) -> SourceSoil:
         raise InputError(f"{path} is not JSON; needed is the file of `soilml identify`") from None
     if not isinstance(content, dict) or not {"parameters", "runs"} & content.keys():
         raise InputError(f"{path} is no result of `soilml identify`; needed is its file of --out")
+    settings = Settings(content, str(path))
     if "parameters" not in content:
+        count, by = len(settings.table("runs").content), content.get("by", "run")
         raise InputError(
-            f"{path} has {len(content['runs'])} results; needed is one soil: soilml identify "
-            "--where run=NAME"
+            f"{path} has {count} results; needed is one soil: soilml identify --where {by}=VALUE"
         )
-    return _of_fit(Settings(content, str(path)), str(path))
+    return _of_fit(settings, str(path))
 
 
 def _of_fit(fit: Settings, path: str) -> SourceSoil:

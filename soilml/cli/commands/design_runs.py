@@ -37,6 +37,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.experiment_design import simulator_runs as runs
     from soilml.io.atomic_files import check_outputs
     from soilml.optional_imports import need
+    from soilml.quantities import column
 
     need("scipy", "plan runs")
     case = read_case(args.model, with_bias=True, with_simulator=False)
@@ -51,6 +52,10 @@ def run(args: argparse.Namespace) -> int:
         check_outputs([args.out] if args.out else [], [str(simulator.runs)])
         earlier = read_runs(simulator.runs)
         made = emulator_of(earlier, simulator.gear, case.prior)
+        if missing := [c for c in map(column, made[0].inputs) if c not in inputs]:
+            raise InputError(
+                f"{earlier.source} varies {missing[0]}, which has no prior in [soil.prior]"
+            )
         tell("\n".join(runs.emulator_errors(earlier, *made)))
         most, seed = runs.FURTHER, args.seed + len(earlier)  # not the runs of before
     else:

@@ -171,7 +171,7 @@ def _structs_that_are_runs(recordings: Log, clock: str) -> int:
     alike = [recordings[i] for i in alike_structs(recordings)]
     if any(r.clock is not None or clock not in r.columns for r in alike):
         return 0
-    return 0 if any(says(r.name, "places", "wheel") for r in alike) else len(alike)
+    return 0 if any(says(r.name, "places", "corners", "wheel") for r in alike) else len(alike)
 
 
 def _restarts_and_pauses(recordings: Log, column: str, unit: str) -> tuple[int, int, float]:

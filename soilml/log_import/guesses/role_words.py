@@ -70,7 +70,8 @@ USUAL = {
 #: Score from which a name says the role whatever the topic is called; least letters of a word that
 #: says it in full.
 CLEAR, _FULL = 4.0, 4
-WHEEL_WORDS = ("places", "corners")  # Groups of words that say which wheel a column belongs to
+#: Groups of words that say which wheel a column belongs to.
+WHEEL_WORDS = ("places", "corners", "numbers")
 #: Words of columns with the size of the wheel of each row, and their signs alone.
 _SIZES = re.compile(
     r"radius|radio|rayon|raggio|dia|diam|di[aáà]m[eèé]tr[eo]|diameter|durchmesser|width|breite|"

@@ -133,6 +133,10 @@ def test_plan_runs_proposes_runs_and_further_ones(workplace, capsys):
     assert main(["plan", "runs", "model.toml", "--out", "simulated.csv"]) == 2
     assert "simulated.csv is an input and would be overwritten" in capsys.readouterr().err
     assert read_case("model.toml").simulator.error["torque_Nm"] > 0.0
+    fewer = (MODEL + SIMULATOR).replace("cohesion = [0.0, 3000.0]\n", "")
+    (workplace / "model.toml").write_text(fewer)
+    assert main(["plan", "runs", "model.toml", "--out", "most.csv"]) == 2
+    assert "varies cohesion_Pa, which has no prior" in capsys.readouterr().err
 
 
 def refused(tmp_path, text="", table=None):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from soilml.gap.decision import decide
+from soilml.gap.estimates import likeliest
 
 
 @pytest.mark.parametrize(("no_gap", "status"), [(0.3, "suspected"), (0.0, "unknown")])
@@ -30,3 +31,9 @@ def test_a_smooth_error_is_stated_where_it_is_likelier_than_each_effect(no_gap, 
     if status == "suspected":
         assert [r.code for r in decision.reasons] == ["gap-not-certain"]
         assert decision.listed == (("rate",), ("slope",))
+
+
+def test_explanations_of_a_file_have_a_weight_there():
+    weights = {"a": 0.8, "b": 0.1, "c": 4e-5, "d": 3e-5}
+    posterior = SimpleNamespace(nodes=[*weights], node_weight=weights.get)
+    assert likeliest(posterior) == [(0.8, "a"), (0.1, "b")]

@@ -188,6 +188,9 @@ SHEAR = {
         *curves(False, "{up},{s},{x},{tau}")],
     "no column of tests": ["Normal Stress (kPa),Horizontal Displacement (mm),Shear Stress (kPa)",
                            *curves(False)],
+    "a lateral pressure beside": [
+        "Horizontal Displacement (mm),Lateral Pressure (kPa),Normal Stress (kPa),"
+        "Shear Stress (kPa)", *curves(False, "{x},0,{s},{tau}")],
     "German compounds": ["Normalspannung [kPa],Scherweg [mm],Scherspannung [kPa]",
                          *curves(False)],
 }  # fmt: skip
@@ -232,6 +235,15 @@ def test_one_plate_of_a_simulation_states_its_size_in_the_head(tmp_path):
     out = tmp_path / "soil.json"
     assert main(["bevameter", str(written(tmp_path, "\n".join(lines))), "--out", str(out)]) == 0
     assert json.loads(out.read_text())["estimates"]["n"]["value"] == pytest.approx(1.1, rel=1e-3)
+
+
+@pytest.mark.parametrize("stress", ["Load cell pressure", "Pressure"])
+def test_a_cell_alone_makes_no_triaxial_test(stress, tmp_path):
+    path = written(tmp_path, f"Test,Sinkage [mm],{stress} [kPa],Cell pressure [kPa]\n" + "\n".join(
+        f"1,{z},{z**0.8:.4f},{z}" for z in range(1, 11)))  # fmt: skip
+    found = read_soil_tests(path)
+    assert found is not None
+    assert np.allclose(found.table["pressure_Pa"], 1e3 * np.arange(1, 11) ** 0.8, rtol=1e-3)
 
 
 @pytest.mark.parametrize(

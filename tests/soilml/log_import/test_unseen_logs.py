@@ -55,16 +55,18 @@ def test_a_struct_per_test_is_a_run(array, tmp_path):
     np.testing.assert_allclose(found.table["load_N"], [50, 50, 80, 80], rtol=0.02)
 
 
-def test_structs_of_wheels_are_wheels(tmp_path):
+@pytest.mark.parametrize(
+    ("names", "second"), [(("wheel1", "wheel2"), "wheel_2"), (("FL", "FR"), "front_right")]
+)
+def test_structs_of_wheels_are_wheels(names, second, tmp_path):
     from scipy.io import savemat
 
     d = drive(np.random.default_rng(73), slips=(0.2,))
     own = {"t": d.time, "omega": d.rim / RADIUS, "torque": d.torque, "Fz": d.load}
-    savemat(
-        tmp_path / "w.mat", {"wheel1": own, "wheel2": own, "body": {"t": d.time, "v": d.ground}}
-    )
+    wheels = dict.fromkeys(names, own)
+    savemat(tmp_path / "w.mat", {**wheels, "body": {"t": d.time, "v": d.ground}})
     text = init_map(tmp_path / "w.mat")
-    assert "each_struct" not in text and "[wheels.wheel_2.torque]" in text
+    assert "each_struct" not in text and f"[wheels.{second}.torque]" in text
     text = (
         '[time]\ncolumn = "t"\n[runs]\neach_struct = true\n[slip]\nvalue = 0.1\n[load]\nvalue = 1'
     )

@@ -150,7 +150,11 @@ def test_every_parameter_of_the_soil_is_mapped_or_said_to_be_ignored(tmp_path, n
     [
         (["result.json", "--to", "crono"], "did you mean 'chrono'? there are: chrono, gazebo"),
         (["result.json", "--to", "chrono", "--draws", "401"], "has 400 draws: give 400 or fewer"),
-        (["several.json", "--to", "chrono"], "needed is one soil: soilml identify --where"),
+        (
+            ["several.json", "--to", "chrono"],
+            "needed is one soil: soilml identify --where gear=VALUE",
+        ),
+        (["no_table.json", "--to", "chrono"], "needed is a table [runs]"),
         (["plain.toml", "--to", "gazebo", "--draws", "3"], "have no prior in [soil.prior]"),
         (["old.json", "--to", "gazebo"], "lacks model.soil"),
         (["drawless.json", "--to", "gazebo", "--draws", "3"], "only averaged and posterior"),
@@ -173,7 +177,8 @@ def test_what_cannot_be_exported_is_one_line(tmp_path, monkeypatch, capsys, word
         "wild": good | {"model": {"soil": wild}},
         "ragged": good | {"draws": {"cohesion": [1.0], "n": [1.0, 1.1]}},
         "list": [1, 2],
-        "several": {"runs": {"a": good, "b": good}},
+        "several": {"by": "gear", "runs": {"a": good, "b": good}},
+        "no_table": {"runs": 5},
     }
     for name, content in files.items():
         (tmp_path / f"{name}.json").write_text(json.dumps(content))
