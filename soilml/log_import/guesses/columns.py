@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.role_words import (
     CLEAR,
     USUAL,
@@ -229,6 +230,17 @@ def time_unit(values: Floats) -> tuple[str, bool]:
         return "us", False
     unit = "ms" if step >= 1.0 and span > 300.0 and own.size > 50 else "s"
     return unit, unit == "s" and step < 1.0
+
+
+def liveliest(runs: Sequence[Run]) -> Run:
+    """The run with the most columns that vary: one in which no sensor is dead."""
+
+    def varying(run: Run) -> int:
+        every = (values for own in run.recordings for values in own.columns.values())
+        known = (values[np.isfinite(values)] for values in every)
+        return sum(own.size > 1 and float(np.ptp(own)) > 0.0 for own in known)
+
+    return max(runs, key=varying)
 
 
 def describe(columns: Sequence[Candidate], recordings: Sequence[Recording]) -> list[str]:

@@ -12,7 +12,7 @@ from soilml.log_import.channels.runs import run_names, runs_of
 from soilml.log_import.guesses.assignment import assign, axle_of, by_behaviour
 from soilml.log_import.guesses.channel_drafts import add_errors, draft_channels, is_error
 from soilml.log_import.guesses.clocks_and_runs import Division, divide, refuse_a_table_of_runs
-from soilml.log_import.guesses.columns import candidates_of, describe
+from soilml.log_import.guesses.columns import candidates_of, describe, liveliest
 from soilml.log_import.guesses.constants import agreed_constants, number_in_names, stated_radius
 from soilml.log_import.guesses.draft import Draft, driving_means, implied_radius, inputs_of
 from soilml.log_import.guesses.evidence import Judge
@@ -27,7 +27,7 @@ from soilml.log_import.units import factor
 
 _USUAL, _SHARE = 2.0, 0.15  # Shortest window for long runs, s, and its share of short ones
 _MOST_WHEELS = 8  # Wheels that may share a mass, where nothing says how many do
-_MOST_LISTED = 40  # Most columns that are listed
+_MOST_LISTED, _LOOKED = 40, 8  # Most columns that are listed, and runs that are looked at
 _PLAUSIBLE = (0.02, 0.7)  # Radii of wheels, m
 #: Roles that are needed: what may stand for each, and what a map then says.
 _NEEDED = {
@@ -84,7 +84,7 @@ class _Guess:
         )
         self.runs = runs_of(logs, replace(found, runs=replace(found.runs, each_row=False)))
         self.run_names = [run.name for run in self.runs]
-        self.run = self.runs[0]
+        self.run = liveliest(self.runs[:_LOOKED])
         clocks = {found.time.column, *(kind.time_column for kind in found.files)}
         columns = candidates_of(self.run.recordings, self.steady)
         self.columns = [c for c in columns if c.name not in clocks]

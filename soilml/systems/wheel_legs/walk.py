@@ -26,7 +26,11 @@ MAX_NEWTON_STEPS = 25
 #: Largest change of velocity by a Newton update, as a fraction of the speed of the leg's end: the
 #: force is a function of the direction of motion and nearly singular at rest.
 MAX_UPDATE = 0.3
-MAX_BISECTIONS = 16  # How often a step that does not converge is halved
+#: How often a step that does not converge is halved, and a step with an abrupt change of velocity.
+MAX_BISECTIONS, MAX_ABRUPT_BISECTIONS = 16, 5
+#: Change of the vertical velocity that counts as abrupt (a fall or an impact), as a fraction of the
+#: speed of the leg's end.
+ABRUPT_CHANGE = 0.2
 HALVINGS = 40  # Bisection steps for the height of the hub at the start
 
 
@@ -225,14 +229,15 @@ def implicit_step(
 
     .. math:: M (v' - v) / dt = F(v', z + v'_z dt) - M g
 
-    is solved by a damped Newton method in both velocities. Cases that do not converge take the step
-    in two halves, recursively (`depth`). A case with a commanded slip has its horizontal velocity
-    prescribed.
+    is solved by a damped Newton method in both velocities. Cases that do not converge, or whose
+    velocity changes abruptly, take the step in two halves, recursively (`depth`). A case with a
+    commanded slip has its horizontal velocity prescribed.
 
     Returns hubs (4, cases), forces (3, cases) at the end, and whether they balance there, (cases,).
     """
     end, forces, converged = _newton(legs, hub, start, stop)
-    repeated = np.flatnonzero(~converged)
+    abrupt = np.abs(end[3] - hub[3]) > ABRUPT_CHANGE * legs.tip_speed
+    repeated = np.flatnonzero(~converged | (abrupt & (depth < MAX_ABRUPT_BISECTIONS)))
     if repeated.size and depth < MAX_BISECTIONS:
         middle, some = 0.5 * (start + stop), legs.select(repeated)
         halfway, _, first = implicit_step(some, hub[:, repeated], start, middle, depth + 1)
