@@ -43,8 +43,12 @@ ROOMS = {
         "soilml/physics commands/test_contract.py soilml/traction soilml/config/test_simulator.py",
         "",
     ),
-    "fitting": ("soilml/fitting", "soilml/fitting", ""),
-    "inference": ("soilml/inference", "soilml/inference", ""),
+    "fitting": ("soilml/fitting", "soilml/fitting soilml/identification soilml/gap", ""),
+    "inference": (
+        "soilml/inference",
+        "soilml/inference soilml/identification soilml/gap test_gap_stories.py",
+        "",
+    ),
     "identification": ("soilml/identification", "soilml/identification", "/plot"),
     "onboard": (
         "soilml/onboard",
