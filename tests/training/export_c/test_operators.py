@@ -129,7 +129,7 @@ def library(folder, functions, shared):
         [
             "#include <math.h>\n#include <stdbool.h>\n#include <string.h>",
             f"typedef struct {{ {members} }} WORK;",
-            "WORK work;",
+            "WORK memory;",
             *(array(*parts) for parts in shared.constants.values()),
             *kernel_texts(shared),
             *(f.text.removeprefix("static ").replace("static ", "") for f in functions),
@@ -150,7 +150,7 @@ def called(compiled, function, given):
     }
     arrays = {k: np.ascontiguousarray(x, PASSED[x.dtype.name]) for k, x in given.items()} | found
     pointers = {k: array.ctypes.data_as(ctypes.c_void_p) for k, array in arrays.items()}
-    pointers["work"] = ctypes.byref(ctypes.c_char.in_dll(compiled, "work"))
+    pointers["work"] = ctypes.byref(ctypes.c_char.in_dll(compiled, "memory"))
     getattr(compiled, name)(*(pointers[key] for key in parameters.split(", ")))
     return found
 
