@@ -184,7 +184,7 @@ def main(benches: Sequence[Bench], words: Sequence[str] | None = None) -> None:
     args = parser.parse_args(words)
     if unknown := [name for name in args.names if name not in known]:
         parser.error(f"no bench {', '.join(unknown)}; there are: {', '.join(known)}")
-    sample, part = Sample(args.quick, tuple(args.seeds)), args.only or args.every > 1
+    sample = Sample(args.quick, tuple(args.seeds))
     for bench in [known[n] for n in args.names] or [b for b in benches if not b.long]:
         if args.tables:
             head = json.loads((RESULTS / f"{bench.name}.json").read_text(encoding="utf-8"))
@@ -197,10 +197,11 @@ def main(benches: Sequence[Bench], words: Sequence[str] | None = None) -> None:
             if all(str(case.get(key)) == value for key, value in wanted.items())
         ]
         records = run(bench, thinned(cases, args.every), args.workers)
-        if args.quick or args.seeds or part:
+        if args.quick or args.seeds or args.only:
             print(f"## {bench.title}\n\n{bench.tables(rows_of(records)).strip()}\n", flush=True)
             continue
-        write(bench, records, f"python bench/run.py {bench.name}")
+        part = f" --every {args.every}" if args.every > 1 else ""
+        write(bench, records, f"python bench/run.py {bench.name}{part}")
         (UNFINISHED / f"{bench.name}.jsonl").unlink()
         print(f"written: bench/results/{bench.name}.json and .md", flush=True)
 

@@ -49,7 +49,7 @@ class DrivenVehicle:
         """The rover of a case at a travel speed, m/s; `InputError` without a rover."""
         rover = case.rover
         if rover is None:
-            raise InputError("the model file has no [rover]")
+            raise InputError("the model file has no [rover]; needed are its mass and wheels")
         gears, passes = wheel_gears(case), wheel_passes(case)
         others = {"slip_angle": 0.0} | ({} if speed is None else {"speed": speed})
         wheels = {

@@ -7,7 +7,7 @@ from simulated_rig import LOAD, RADIUS, RADIUS_EDIT, drive, imported, torque_law
 from soilml.errors import InputError
 from soilml.log_import import init_map
 from soilml.log_import.checks.table_hints import table_hints
-from soilml.remarks import about, texts
+from soilml.remarks import about
 
 SLIPS = (0.1, 0.3, 0.5)
 
@@ -80,7 +80,8 @@ def test_a_run_without_data_is_one_line(tmp_path):
             columns = {name: (0.0 if name != "t" else 1.0) * v for name, v in columns.items()}
         logs.append(write_csv(tmp_path / f"run_{k}.csv", columns))
     found, _ = imported(tmp_path, logs, [RADIUS_EDIT])
-    assert all("run run_2: the sensor of" in text for text in texts(found.remarks))
+    assert {remark.code for remark in found.remarks} == {"dead-sensor"}
+    assert all("run_2" in remark.about for remark in found.remarks)
     assert list(found.table["run"]) == ["run_0", "run_1", "run_3"]
 
 
