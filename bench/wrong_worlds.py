@@ -10,7 +10,6 @@ from drawn_errors import DrawnErrors
 
 from datagen.blind_sets.plans import MECHANISMS
 from datagen.blind_sets.reference_wheel import (
-    ContactArc,
     ContactPoints,
     Mechanism,
     WheelState,
@@ -106,9 +105,7 @@ def mechanisms() -> dict[str, Mechanism]:
     return known | {"falls-beyond-two-moduli": falls}
 
 
-def _falls_beyond_two_moduli(
-    points: ContactPoints, arc: ContactArc, rows: WheelState, share: float
-) -> Floats:
+def _falls_beyond_two_moduli(points: ContactPoints, rows: WheelState, share: float) -> Floats:
     """Janosi and Hanamoto's stress up to j = 2 K, which then falls by `share`, over 2 K to 1/e.
 
     Its modulus is that of the first slope; that of Wong's hump is about twice as large.
